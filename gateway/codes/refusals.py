@@ -354,8 +354,8 @@ class RefusalReason(IntEnum):
         Explanation(
             "W313",
             "bit 0, 5 or 6 was held at 1",
-            "A run has ended, another master has reset a fault, or control has died in it, and who writes control_word in "
-            "cycles still holds the bit.",
+            "A run has ended, another master has reset a fault, or the gateway was started again, and who writes control_word "
+            "in cycles still holds the bit.",
             "Another run would begin by itself, and the next after it; or a force, by a reset alone.",
             "Write control_word with the bit as 0 once; the next 1 counts.",
         ),

@@ -165,11 +165,6 @@ class CommandTracker:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
         return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
 
-    @property
-    def has_lease(self) -> bool:
-        """Decide whether a master has to beat."""
-        return self._settings.supervision.lease_s is not None
-
     def would_start_lease(self, command: Command) -> bool:
         """Return whether this command is a takeover with a lease of its own, were it taken now."""
         return bool(command.control_word & _TAKE) and self._lease.would_start_for(command.peer)

@@ -95,7 +95,7 @@ class EdgeCheck:
         """Nothing begins by a frame that was refused beside another owner, and comes on and on: its program may stand still.
         A takeover is judged by its own heartbeat."""
         acts = edges.rises
-        if not (command.repeats_refused and acts and self._commands.has_lease) or acts & _TAKE:
+        if not (command.repeats_refused and acts) or acts & _TAKE:
             return None
         bit = ControlBit(acts & -acts)
         beat = "no other heartbeat has come than the one that was refused beside another owner"

@@ -98,7 +98,7 @@ class Admission:
         self.decide: Decide = decide_nothing
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
-        self.held_runs, self.held_enables = HeldRuns(), HeldEnables()
+        self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -149,7 +149,9 @@ class Admission:
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered."""
+        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
+        if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
+            self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
             self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
@@ -253,18 +255,15 @@ class Admission:
         return tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
 
     def _not_owner(self, address: int, host: str) -> Refusal:
-        cure = (
-            "write control_word with bit 3 to take over"
-            if self._ownership.may_take_over(host)
-            else "this rig names its owner"
-        )
+        may_take_over = self._ownership.may_take_over(host)
+        cure = "write control_word with bit 3 to take over" if may_take_over else "this rig names its owner"
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_starts(self, command: Command, rises: int, word_at: int, beat: int | None) -> None:
         host, written = command.peer, int(command.control_word)
         if rises & ENABLE and self.held_enables.holds(host, command.received_s, beat):
-            text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
+            text = "enable was kept at 1 over a fault, a loss or a restart: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
