@@ -91,7 +91,7 @@ class CommandTracker:
             self._adopt_heartbeat = False
             if not command.control_word and not command.heartbeat:  # any other value is a master's
                 self._lease.adopt(command.heartbeat)
-        if command.has_waited or command.repeats_refused:
+        if command.has_waited or command.repeats:
             self._lease.adopt(command.heartbeat)
         else:
             self._lease.observe(now_s, command.heartbeat, command.peer)

@@ -134,12 +134,12 @@ class Admission:
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
         beat = heartbeat if HEARTBEAT in self._offsets(write) else None
-        repeats = self.held_enables.repeats_refused(write.host, beat, now_s)
-        command = command._replace(has_waited=write.has_waited, repeats_refused=repeats)
+        repeats = self.held_enables.repeats(write.host, beat, now_s, takes=bool(written & TAKE))
+        command = command._replace(has_waited=write.has_waited, repeats=repeats)
         self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
-        if rises & STARTS:
-            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD), beat)
+        if rises & STARTS or is_taken_over:
+            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD))
         self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
@@ -260,16 +260,17 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, command: Command, rises: int, word_at: int, beat: int | None) -> None:
+    def _check_starts(self, command: Command, rises: int, word_at: int) -> None:
         host, written = command.peer, int(command.control_word)
-        if rises & ENABLE and self.held_enables.holds(host, command.received_s, beat):
-            text = "enable was kept at 1 over a fault, a loss or a restart: write it as 0 once, then as 1"
+        enables = rises | (written if written & TAKE else 0)  # who takes over goes on with what another one has enabled
+        if enables & ENABLE and self.held_enables.holds(host, command.received_s):
+            text = "enable was kept at 1 over a fault: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
-        if self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
+        if rises & STARTS and self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
             name = str(ControlBit(rises & STARTS & -(rises & STARTS)).name).lower()
             text = f"{name} refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
             raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))

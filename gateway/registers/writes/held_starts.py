@@ -85,10 +85,14 @@ class HeldEnables:
         if len(self._refused) > _MOST_HOLDERS:
             del self._refused[next(iter(self._refused))]
 
-    def repeats_refused(self, host: str, heartbeat: int | None, now_s: float) -> bool:
-        """Decide whether a write brings no other heartbeat than the host's last refused one: by that of a program that hung
-        while another master owned, the machine would press when that one stops. heartbeat: None where it brings none."""
-        if host not in self._refused or heartbeat not in (None, self._refused[host][0]):
+    def repeats(self, host: str, heartbeat: int | None, now_s: float, *, takes: bool = False) -> bool:
+        """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
+        was refused last: by the frame of a program that hung while another master owned, the machine would press when that one
+        stops. heartbeat: None where it brings none: the one that stands may be nobody's; takes: it takes over, as who is
+        refused is told to."""
+        if host in self.lost and heartbeat in (None, self.lost[host]):
+            return True
+        if takes or host not in self._refused or heartbeat not in (None, self._refused[host][0]):
             return False
         refused, refused_s = self._refused.pop(host)
         if now_s - refused_s >= _HELD_S:
@@ -100,12 +104,8 @@ class HeldEnables:
         """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
         return host in self.by_host or host in self.lost or host in self._lost_now or host in self._refused
 
-    def holds(self, host: str, now_s: float, heartbeat: int | None = None) -> bool:
-        """Decide whether a 1 of this host is one that it has kept up since the fault, or since its loss in the process before.
-        If so, it goes on being kept up. heartbeat: what it writes beside it, None where it writes none: the one that stands
-        may be nobody's."""
-        if host in self.lost and heartbeat in (None, self.lost[host]):
-            return True
+    def holds(self, host: str, now_s: float) -> bool:
+        """Decide whether a 1 of this host is one that it has kept up since the fault. If so, it goes on being kept up."""
         if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
             self._forget(host)
             return False

@@ -32,7 +32,7 @@ def test_the_last_frame_of_a_program_that_hung_presses_nothing_behind(ends: str,
     try:
         until_s = time.monotonic() + 0.5
         while time.monotonic() < until_s:
-            assert gateway.write(0, *frame).exception_code == 4
+            assert gateway.write(0, *frame).exception_code == 3
             status = gateway.status()
             assert (status["state"], status["output_voltage"]) == (OFF, 0)
         assert not gateway.write(0, *frame[:4], 4712).isError(), "its program goes on"

@@ -11,7 +11,7 @@ from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
 
 HUNG = (ENABLE, 3000, 0, 0, 139)
 
@@ -116,7 +116,20 @@ def test_behind_a_death_the_frames_of_a_program_that_has_just_hung_press_not(act
         rig = begun(rig.bank.command.heartbeat)
     assert kept["lost_beats"][OTHER.host] == 139 and kept["owner"] is None
     for refused in flow(rig, 2.0):
-        assert refused and refused.reason is RefusalReason.CALIBRATION_HELD
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     assert (rig.state, rig.wire.voltage_v) == (State.OFF, 0.0)
     rig.write(0, *HUNG[:4], 140, peer=OTHER)
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+def test_behind_a_death_a_hung_program_takes_no_force_of_a_living_master_over_by_bit_3_of_its_last_frame() -> None:
+    kept: dict[str, Any] = {"lost_beats": {OTHER.host: 139}}
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    Handover(kept, record=False).restore_held(rig.bank, rig.now(), lambda **facts: None)
+    rig.write(0, ENABLE, 800, 0, 0, 1)
+    for _ in range(30):
+        refused = rig.run(0.1).answer(0, ENABLE | TAKE, *HUNG[1:], peer=OTHER)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.bank.owner == OWNER.host and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+    rig.write(0, ENABLE | TAKE, *HUNG[1:4], 140, peer=OTHER)
+    assert rig.bank.owner == OTHER.host, "its program goes on"

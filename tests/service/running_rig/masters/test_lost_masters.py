@@ -13,7 +13,7 @@ from gateway.registers.words import State
 from gateway.registers.writes.held_starts import HeldEnables
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, RESET, TAKE, SmallRig
 
 
 @pytest.mark.parametrize("ago_s", [0.0, 0.2, 0.34])
@@ -217,3 +217,24 @@ def test_the_masters_that_were_lost_are_sixty_four() -> None:
             held.note_lost(f"10.0.0.{number}", beat)
     held.note_lost(None, 5)
     assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4
+
+
+@pytest.mark.parametrize("lease_s", [None, LEASE_S])
+def test_who_keeps_enable_at_1_over_a_fault_takes_no_force_of_another_one_over_by_bit_3_of_its_frames(
+    lease_s: float | None,
+) -> None:
+    """They had been refused over the fault: somebody reset it and enabled 8 N, and the next one pressed 30 N."""
+    rig = SmallRig(settings(lease_s=lease_s)).faulted()
+    frame = ENABLE | TAKE, 3000, 0, 0, 139
+    for _ in range(10):
+        assert rig.run(0.1).answer(0, *frame, peer=OTHER)
+    rig.write(0, RESET, 0, 0, 0, 9000)
+    rig.write(0, ENABLE, 800, 0, 0, 9001)
+    for _ in range(30):
+        refused = rig.run(0.1).answer(0, *frame, peer=OTHER)
+        assert refused and refused.reason is RefusalReason.CALIBRATION_HELD
+    assert rig.bank.owner == OWNER.host and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+    rig.write(0, 0, peer=OTHER)
+    rig.write(0, ENABLE, 800, 0, 0, 9002)
+    rig.write(0, *frame, peer=OTHER)
+    assert rig.bank.owner == OTHER.host, "behind its own 0 it counts"
