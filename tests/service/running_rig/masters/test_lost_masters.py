@@ -158,6 +158,22 @@ def test_what_somebody_has_lowered_beside_a_lost_master_its_frames_do_not_raise(
     assert rig.run(6.0).plant.force_n == pytest.approx(30.0, abs=0.5), "it goes on"
 
 
+@pytest.mark.parametrize("ago_s", [0.0, 0.01, 0.05])
+def test_what_somebody_has_just_lowered_beside_a_lost_master_its_next_frame_does_not_raise(ago_s: float) -> None:
+    """Before the next step the force had not begun to fall: 12 N were no more than was held, and undid the 5 N for good."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)).holding()
+    rig.write(0, *(frame := (ENABLE, 1200, 0, 0, 4711)))
+    rig.beats = False
+    rig.run(LEASE_S + 0.1).write(0, *frame)
+    rig.write(1, 500, peer=OTHER)
+    rig.run(ago_s)
+    for _ in range(20):
+        refused = rig.answer(0, *frame)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+        rig.run(0.1)
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.5)
+
+
 def test_what_another_master_has_pressed_and_left_the_frames_of_one_that_hung_before_do_not_raise() -> None:
     """Another one had taken over, and pressed 8 N until it was lost: the first one's frames, refused so far, pressed 30 N."""
     rig = Held()
