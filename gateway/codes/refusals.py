@@ -278,8 +278,8 @@ class RefusalReason(IntEnum):
         Explanation(
             "W302",
             "reset, enable or more without a new heartbeat",
-            "With a lease: the heartbeat beside a reset, enable, second takeover, or more than is held for a lost master, is "
-            "that of before.",
+            "With a lease: the heartbeat of before is beside a reset, second takeover, enable behind a loss or another's stop, "
+            "or more than is held then.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
             "Write the bit and another heartbeat value in one request; with a reset force_setpoint 0, too.",
         ),
@@ -354,8 +354,8 @@ class RefusalReason(IntEnum):
         Explanation(
             "W313",
             "bit 0, 5 or 6 was held at 1",
-            "A run has ended, another master has reset a fault, or control has died in it, and who writes control_word in "
-            "cycles still holds the bit.",
+            "A run has ended, another master has reset a fault, or the gateway was started again, and who writes control_word "
+            "in cycles still holds the bit.",
             "Another run would begin by itself, and the next after it; or a force, by a reset alone.",
             "Write control_word with the bit as 0 once; the next 1 counts.",
         ),

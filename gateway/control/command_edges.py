@@ -91,12 +91,14 @@ class CommandTracker:
             self._adopt_heartbeat = False
             if not command.control_word and not command.heartbeat:  # any other value is a master's
                 self._lease.adopt(command.heartbeat)
-        if command.has_waited or command.repeats_refused:
+        if command.has_waited or command.repeats:
             self._lease.adopt(command.heartbeat)
         else:
             self._lease.observe(now_s, command.heartbeat, command.peer)
         if edges.rises & _TAKE:
             self._lease.take_over(now_s, command.peer)
+        if edges.stops:
+            self._lease.stop(now_s, command.peer)
         self._wanted_kg = command.payload_kg if command.payload_kg > 0.0 else self._settings.defaults.payload_kg
         self._follow_payload(dt_s)
         self._update_demand()
@@ -162,11 +164,6 @@ class CommandTracker:
     def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
         return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
-
-    @property
-    def has_lease(self) -> bool:
-        """Decide whether a master has to beat."""
-        return self._settings.supervision.lease_s is not None
 
     def would_start_lease(self, command: Command) -> bool:
         """Return whether this command is a takeover with a lease of its own, were it taken now."""

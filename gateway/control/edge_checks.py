@@ -57,7 +57,7 @@ class EdgeCheck:
         if not edges.stops and (
             busy := self._busy(proposal, edges, at)
             or _old(proposal.command, edges)
-            or self._repeats_refused(proposal.command, edges)
+            or _repeated(proposal.command, edges)
             or self._rises_unbeaten(proposal.command, at)
         ):
             return busy
@@ -91,23 +91,13 @@ class EdgeCheck:
         situation_text = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
         return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {situation_text}; enable again then")
 
-    def _repeats_refused(self, command: Command, edges: Edges) -> EdgeRefusal | None:
-        """Nothing begins by a frame that was refused beside another owner, and comes on and on: its program may stand still.
-        A takeover is judged by its own heartbeat."""
-        acts = edges.rises
-        if not (command.repeats_refused and acts and self._commands.has_lease) or acts & _TAKE:
-            return None
-        bit = ControlBit(acts & -acts)
-        beat = "no other heartbeat has come than the one that was refused beside another owner"
-        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, bit, f"{str(bit.name).lower()} refused: {beat}: write one")
-
     def _rises_unbeaten(self, command: Command, at: Situation) -> EdgeRefusal | None:
         """What is held for a lost master rises with a beat alone, as nothing is enabled without one: the frame of a program
         that stands still asks for its own force for ever, also behind somebody who has lowered it, or has taken over."""
         commands, before = self._commands, self._commands.command
         if (
             at.held_n is None
-            or (commands.would_have_beaten_since(at.lost_s, command) and not command.repeats_refused)
+            or (commands.would_have_beaten_since(at.lost_s, command) and not command.repeats)
             or commands.would_start_lease(command)
         ):
             return None
@@ -186,10 +176,10 @@ class EdgeCheck:
         return None
 
     def _repeated(self, command: Command, at: Situation) -> EdgeRefusal | None:
-        """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost."""
+        """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost or stopped."""
         if self._commands.would_have_beaten_since(at.lost_s, command):
             return None
-        beat = f"heartbeat = {command.heartbeat} as when the master was lost"
+        beat = f"heartbeat = {command.heartbeat} as when the master was lost, or another one switched it off"
         text = f"enable refused: {beat}: write another value with it"
         return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.ENABLE, text)
 
@@ -255,6 +245,17 @@ def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
     bit = ControlBit(acts & -acts)
     waits = f"{command.peer} asks more than is answered, so that this has waited"
     return EdgeRefusal(RefusalReason.NOT_READY, bit, f"{str(bit.name).lower()} refused: {waits}: wait for each answer")
+
+
+def _repeated(command: Command, edges: Edges) -> EdgeRefusal | None:
+    """Why nothing begins, and nobody takes over, by a frame that comes on and on, and has been refused, or was there before the
+    restart: its program may stand still."""
+    acts = edges.rises
+    if not command.repeats or not acts:
+        return None
+    bit = ControlBit(acts & -acts)
+    beat = f"{command.peer} has written no other heartbeat than beside another owner, or before the restart"
+    return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, bit, f"{str(bit.name).lower()} refused: {beat}: write one")
 
 
 def _no_run(reason: RefusalReason, why: str, plan: AnyPlan) -> EdgeRefusal:

@@ -18,7 +18,7 @@ from gateway.control.state_table import ENABLED_STATES, StateEvent, next_state
 from gateway.control.supervision.fault_detection import FaultDetector, StopCause, stop_cause
 from gateway.control.supervision.one_shot_events import OneShotEvents
 from gateway.control.supervision.safe_voltage import SafeVoltageCheck
-from gateway.registers.words import State
+from gateway.registers.words import Mode, State
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +162,10 @@ class Transitions:
             self.held_n = self.parts.loop.applied_n
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
-        self.held_n = min(self.held_n, self.parts.loop.applied_n)
+        lowered_n = (
+            commands.demand.force_n if commands.demand.mode is Mode.FORCE else inf
+        )  # at once, not along its ramp
+        self.held_n = min(self.held_n, self.parts.loop.applied_n, lowered_n)
         if before != self._unbeaten and not self.is_ramping_down:
             self.outcome.release_owner = True
 

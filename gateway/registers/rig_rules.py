@@ -16,7 +16,7 @@ class BankRules:
     payload_max_kg bounds payload: what the load cell bears.
 
     setpoint_min_n: smallest force_setpoint beside 0. force_source: who says these two, empty for the rig. owner: the one host
-    that may command, None for the first that does.
+    that may command, None for the first that does. has_lease: a master has to beat.
     """
 
     rig_name: str
@@ -29,3 +29,4 @@ class BankRules:
     supported_bits: ControlBit = BASIC_BITS
     require_byte_order_echo: bool = False
     owner: str | None = None
+    has_lease: bool = False

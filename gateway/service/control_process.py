@@ -28,12 +28,13 @@ from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.profiles.kept_rig import keep_rig, kept_rig
 from gateway.recording.ring import SampleRing
 from gateway.service import banner
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.control_loop import Log
 from gateway.service.running_rig.faces.faces import with_rtu_face
-from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.handover import Handover, left_of
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
@@ -156,7 +157,9 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         guardian.on_ports = running.move_ports
         ready = await running.start(
             options["bind"],
-            Handover(options["kept"], record=options["record"]),
+            Handover(
+                options["kept"] or left_of(CleanShutdownMarker(Path(options["state"])).left), record=options["record"]
+            ),
             restarted=Ending.from_json(options["restarted"]),
         )
         ready = replace(ready, notes=ready.notes + notes, http=listeners.addresses)

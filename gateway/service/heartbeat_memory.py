@@ -1,4 +1,5 @@
-"""The heartbeat of the control loop in memory that it shares with the guardian: when it beat last.
+"""The heartbeat of the control loop in memory that it shares with the guardian: when it beat last. Beside it stands that of the
+master, for the control process that is started next.
 
 A beat is one store of eight bytes, and wakes nobody: the guardian looks when the next one is overdue, a tenth as often as the
 loop beats. As a message each beat woke the guardian, which cost the loop up to a quarter of a millisecond, fifty times a
@@ -9,7 +10,7 @@ import mmap
 import os
 from typing import Final
 
-_TIME_BYTES: Final = 8
+_BYTES: Final = 16
 
 
 class HeartbeatMemory:
@@ -17,21 +18,26 @@ class HeartbeatMemory:
 
     def __init__(self, descriptor: int) -> None:
         """Map the memory. OSError when there is none to be had."""
-        if os.fstat(descriptor).st_size < _TIME_BYTES:
-            os.ftruncate(descriptor, _TIME_BYTES)
-        self._map = mmap.mmap(descriptor, _TIME_BYTES)
-        self._time = memoryview(self._map).cast("d")  # one store of eight aligned bytes: never half a time
+        if os.fstat(descriptor).st_size < _BYTES:
+            os.ftruncate(descriptor, _BYTES)
+        self._map = mmap.mmap(descriptor, _BYTES)
+        self._numbers = memoryview(self._map).cast("d")  # one store of eight aligned bytes each: never half a number
 
     @property
     def beat_s(self) -> float:
         """Time of the last beat, s; 0 before the first."""
-        return self._time[0]
+        return self._numbers[0]
 
-    def beat(self, now_s: float) -> None:
-        """Write the time of a beat. now_s: monotonic."""
-        self._time[0] = now_s
+    @property
+    def master_beat(self) -> int:
+        """Value of the master's heartbeat at the last beat; 0 before the first."""
+        return int(self._numbers[1])
+
+    def beat(self, now_s: float, master_beat: int = 0) -> None:
+        """Write the time of a beat, and the value of the master's heartbeat. now_s: monotonic."""
+        self._numbers[0], self._numbers[1] = now_s, master_beat
 
     def close(self) -> None:
         """Close the memory."""
-        self._time.release()
+        self._numbers.release()
         self._map.close()

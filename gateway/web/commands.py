@@ -82,11 +82,13 @@ class Commands:
     # -- what it wants
 
     async def enable(self, viewer: str, force_n: float) -> None:
-        """Enable, with this setpoint. RefusedCommand says why not."""
+        """Enable, with this setpoint, and with another heartbeat where there is a lease: behind a loss, or another one's stop,
+        nothing else counts. RefusedCommand says why not."""
         stops = self._stops
         if self._context.profile.network.require_byte_order_echo:
             await self._write("byte_order_echo@proof", PROOF)
-        words = await self._words_of_force(force_n)
+        lease_s = self._context.profile.control.supervision.lease_s
+        words = await self._words_of_force(force_n, beats=lease_s is not None)
         if stops != self._stops:
             raise RefusedCommand("stopped meanwhile: nothing was enabled")
         words[0] |= int(ControlBit.ENABLE)
@@ -164,14 +166,22 @@ class Commands:
             raise RefusedCommand("a force in newtons is expected")
         return force_n
 
-    async def _words_of_force(self, force_n: float) -> list[int]:
+    async def _words_of_force(self, force_n: float, *, beats: bool = False) -> list[int]:
         """Return control_word, with the bits that stand, and force_setpoint; where another master has left voltage for a mode,
-        in which a force would mean nothing, what lies between them and force as mode as well: all for one write."""
+        in which a force would mean nothing, what lies between them and force as mode as well: all for one write. beats: and
+        what lies between them and another heartbeat."""
         setpoint = self._encode(self._find("force_setpoint"), self._checked(force_n))
-        place = self._find("mode").address - self._find("control_word").address
+        first = self._find("control_word").address
+        place, beat = self._find("mode").address - first, self._find("heartbeat").address - first
         words = await self.words("command")
         words[1], is_force = int.from_bytes(setpoint, "big"), words[place] == Mode.FORCE
         words[place] = int(Mode.FORCE)
+        if beats:
+            self._number = self._number % 65535 + 1
+            if self._number == words[beat]:
+                self._number = self._number % 65535 + 1
+            words[beat] = self._number
+            return words[: beat + 1]
         return words[: 2 if is_force else place + 1]
 
     async def _write_words(self, name: str, words: list[int]) -> None:

@@ -35,13 +35,40 @@ def test_a_loop_that_beats_in_memory_wakes_nobody(ends: Pair) -> None:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
         for tick in range(100):
-            guardian.heartbeat(tick * 0.004)
+            guardian.heartbeat(tick * 0.004, None, 65535 - tick)
+        assert HeartbeatMemory(memory).master_beat == 65436
         ends[0].setblocking(False)
         with pytest.raises(BlockingIOError):
             message_link.receive(ends[0])
         guardian.close()
 
     asyncio.run(scene())
+    os.close(memory)
+
+
+def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heartbeat(ends: Pair) -> None:
+    memory = os.memfd_create("beat")
+
+    async def scene() -> None:
+        ends[1].setblocking(False)
+        guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
+        for tick, owner in enumerate(("10.0.0.5", "10.0.0.5", None, None)):
+            guardian.heartbeat(0.01 * tick, owner, 7 + tick)
+        told = [message_link.receive(ends[0]) for _ in range(2)]
+        assert [message and message.body for message in told] == [{"owner": "10.0.0.5"}, {"owner": None}]
+        guardian.close()
+
+    asyncio.run(scene())
+    ours, theirs = socket.socketpair()
+
+    async def next_one() -> tuple[int | None, int | None]:
+        lines = GuardianLine(ours, HeartbeatMemory(memory)), GuardianLine(theirs)
+        found = lines[0].left_beat, lines[1].left_beat
+        for line in lines:
+            line.close()
+        return found
+
+    assert asyncio.run(next_one()) == (10, None)
     os.close(memory)
 
 

@@ -22,6 +22,7 @@ from gateway.profiles import Rig
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.running_rig import starting
 from gateway.service.running_rig.bank_rules import bank_rules, plain_role, server_settings
+from gateway.service.running_rig.handover import left_of
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.starting import (
     StartError,
@@ -47,6 +48,40 @@ def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
     assert not CleanShutdownMarker(tmp_path).mark_running()
     flag.clear()
     flag.clear()  # twice is no trouble
+
+
+def test_what_a_clean_end_leaves_counts_at_the_next_start_until_the_next_clean_end(tmp_path: Path) -> None:
+    """A fault of a program that hung was restarted away, and its next frame pressed."""
+    flag, left = CleanShutdownMarker(tmp_path), {"lost_beats": {"10.0.0.5": 7}, "held_runs": {"10.0.0.6": 32}}
+    assert flag.left == {}
+    flag.clear({**left})
+    assert CleanShutdownMarker(tmp_path).left == left and (tmp_path / "left.json").stat().st_mode & 0o777 == 0o600
+    for content in ("", "[]", "{", "[" * 100_000):
+        (tmp_path / "left.json").write_text(content)
+        assert flag.left == {}, content[:9]
+    flag.clear()
+    assert not (tmp_path / "left.json").exists()
+    CleanShutdownMarker(tmp_path / "gone").clear(left)  # a disk that does not take it is no reason not to end
+
+
+@pytest.mark.parametrize(
+    ("kept", "left"),
+    [
+        ({}, {}),
+        ({"zero_n": 1.0, "owner": "10.0.0.5", "recording": None, "lost_beats": {}}, {}),
+        (
+            {"held_runs": {"a": 32}, "lost_beats": {"a": 0}, "plant": 3},
+            {"held_runs": {"a": 32}, "lost_beats": {"a": 0}},
+        ),
+        (
+            {"held_runs": {"a": 32.0}, "lost_beats": {"a": True}, "held_enables": {"a": 1.5}},
+            {"held_enables": {"a": 1.5}},
+        ),
+        ({"held_runs": [1], "lost_beats": {"a": None}, "held_enables": "x"}, {}),
+    ],
+)
+def test_by_what_nothing_begins_alone_is_left_behind_a_clean_end(kept: dict[str, Any], left: dict[str, Any]) -> None:
+    assert left_of(kept) == left
 
 
 def test_a_disk_that_does_not_say_how_the_last_run_ended_counts_as_unclean(

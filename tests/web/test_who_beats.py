@@ -5,6 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from gateway.control import LeaseAction
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.registers.words import State
 from gateway.web.commands import Commands
@@ -188,3 +191,32 @@ def test_behind_an_absence_that_ended_the_beat_the_next_command_begins_it_again(
         assert wired.state in (State.RAMPING, State.HOLDING)
 
     play(tmp_path, scene, leased())
+
+
+@pytest.mark.parametrize("ends", ["another one's stop", "its own stop", "a loss", "a heartbeat that stands already"])
+def test_an_enable_of_the_page_counts_behind_whatever_has_ended_its_force(ends: str, tmp_path: Path) -> None:
+    """It brought no heartbeat: behind a loss that ramps to 0 each click on Enable was refused (W302)."""
+    rig = leased()
+    supervision = replace(rig.control.supervision, lease_action=LeaseAction.RAMP)
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        wired = stage.wired
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        await let_turns_pass(40)
+        assert wired.state in (State.RAMPING, State.HOLDING)
+        if ends == "its own stop":
+            await commands.stop()
+        elif ends == "another one's stop":
+            wired.write(0, 0)
+        else:
+            await commands.close()
+        wired.run(2.0)
+        if ends.startswith("a heartbeat"):
+            wired.write(4, (wired.word("heartbeat") + 1) & 0xFFFF)
+        assert wired.state is State.OFF
+        await commands.enable("me", 12.0)
+        await let_turns_pass(40)
+        assert wired.state in (State.RAMPING, State.HOLDING)
+
+    play(tmp_path, scene, replace(rig, control=replace(rig.control, supervision=supervision)))

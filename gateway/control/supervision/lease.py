@@ -1,12 +1,13 @@
 """A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not. Of a master whose last
 frame is sent on and on it does not change, whatever another one has written meanwhile. Who takes over has one whole length to
-beat, not what the one before has left of its own.
+beat, not what the one before has left of its own. Behind a stop of another one nothing begins by the heartbeat that was there
+before it: the next frame of a program that had just hung, and is no lost one yet, would undo it.
 
 A closed connection of the owner counts as loss only where a lease is set; without a lease a command lasts until the
 next one.
 """
 
-from math import inf
+from math import inf, nan
 from typing import Final
 
 _MOST_MASTERS: Final = 64  # whose last heartbeats are known
@@ -19,7 +20,7 @@ class Lease:
         self._length_s = length_s
         self._heartbeat = 0
         self._changed_s = -inf
-        self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came
+        self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
         self._master = ""  # who has the lease
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
@@ -53,6 +54,13 @@ class Lease:
         self._unbeaten[who] = None
         if len(self._unbeaten) > _MOST_MASTERS:
             del self._unbeaten[next(iter(self._unbeaten))]
+
+    def stop(self, now_s: float, who: str) -> None:
+        """Let no beat of before count of any other master that has beaten within one length: this one has switched the output
+        off."""
+        for other, (heartbeat, beaten_s) in self._beats.items():
+            if other != who and self.is_within(beaten_s, now_s):
+                self._beats[other] = heartbeat, nan
 
     def would_start_for(self, who: str) -> bool:
         """Return whether a takeover by this master would start its lease."""

@@ -98,7 +98,7 @@ class Admission:
         self.decide: Decide = decide_nothing
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
-        self.held_runs, self.held_enables = HeldRuns(), HeldEnables()
+        self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -134,12 +134,12 @@ class Admission:
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
         beat = heartbeat if HEARTBEAT in self._offsets(write) else None
-        repeats = self.held_enables.repeats_refused(write.host, beat, now_s)
-        command = command._replace(has_waited=write.has_waited, repeats_refused=repeats)
+        repeats = self.held_enables.repeats(write.host, beat, now_s, takes=bool(written & TAKE))
+        command = command._replace(has_waited=write.has_waited, repeats=repeats)
         self._ask(command, permitted.values, write)
         rises = written & ~int(before[CONTROL_WORD])
-        if rises & STARTS:
-            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD), beat)
+        if rises & STARTS or is_taken_over:
+            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD))
         self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
@@ -149,7 +149,9 @@ class Admission:
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered."""
+        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
+        if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
+            self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
             self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
@@ -253,24 +255,22 @@ class Admission:
         return tuple(name for k, name in enumerate(NAMES) if values[k] != before[k] and k not in _SILENT)
 
     def _not_owner(self, address: int, host: str) -> Refusal:
-        cure = (
-            "write control_word with bit 3 to take over"
-            if self._ownership.may_take_over(host)
-            else "this rig names its owner"
-        )
+        may_take_over = self._ownership.may_take_over(host)
+        cure = "write control_word with bit 3 to take over" if may_take_over else "this rig names its owner"
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, command: Command, rises: int, word_at: int, beat: int | None) -> None:
+    def _check_starts(self, command: Command, rises: int, word_at: int) -> None:
         host, written = command.peer, int(command.control_word)
-        if rises & ENABLE and self.held_enables.holds(host, command.received_s, beat):
-            text = "enable was kept at 1 over a fault or a loss: write it as 0 once, then as 1"
+        enables = rises | (written if written & TAKE else 0)  # who takes over goes on with what another one has enabled
+        if enables & ENABLE and self.held_enables.holds(host, command.received_s):
+            text = "enable was kept at 1 over a fault: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
         if held := rises & self.held_runs.of(host):
             name = str(ControlBit(held & -held).name).lower()
             text = f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1"
             raise Refusal(RefusalReason.CALIBRATION_HELD, word_at, text, value=float(written))
-        if self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
+        if rises & STARTS and self._rules.require_byte_order_echo and not self._echo.is_proven_by(host):
             name = str(ControlBit(rises & STARTS & -(rises & STARTS)).name).lower()
             text = f"{name} refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
             raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))

@@ -42,18 +42,17 @@ class HeldRuns:
 
 class HeldEnables:
     """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
-    all of them, of other times of the same ones once a second. lost: the heartbeat with which each master was lost in the
-    process before; on_lost: told of all of this one's."""
+    all of them, of other times of the same ones once a second. has_lease: a heartbeat has to change; else none is noted. lost:
+    the heartbeat with which each master was lost in the process before; on_lost: told of all of this one's."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, has_lease: bool = True) -> None:
+        self._has_lease = has_lease
         self.on_change: Callable[[dict[str, float]], None] = lambda held: None
         self.on_lost: Callable[[dict[str, int]], None] = lambda lost: None
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, int] = {}
         self._lost_now: dict[str, int] = {}
-        self._refused: dict[
-            str, tuple[int, float]
-        ] = {}  # heartbeat of each that is no owner, and when it came, monotonic s
+        self._refused: dict[str, tuple[int, float]] = {}  # of each that is no owner its heartbeat, and when it came, s
         self._told_s = 0.0
 
     def note(self, host: str, now_s: float) -> None:
@@ -67,8 +66,9 @@ class HeldEnables:
             self.on_change(dict(self.by_host))
 
     def note_lost(self, host: str | None, heartbeat: int) -> None:
-        """Note that a master was lost: by its last frame, sent on and on, the next process would press."""
-        if host is None or self._lost_now.get(host) == heartbeat:
+        """Note that a master is lost, that another one has stopped it, or that the gateway ends: by its last frame, sent on and
+        on, the next process would press."""
+        if host is None or not self._has_lease or self._lost_now.get(host) == heartbeat:
             return
         self._lost_now[host] = heartbeat
         if len(self._lost_now) > _MOST_HOLDERS:
@@ -77,15 +77,22 @@ class HeldEnables:
 
     def note_refused(self, host: str, heartbeat: int, now_s: float) -> None:
         """Note the heartbeat of a write that was refused because another host owns: the same one, on and on, is no beat."""
-        self._refused.pop(host, None)
+        if not self._has_lease:
+            return
+        if self._refused.pop(host, (None,))[0] == heartbeat:
+            self.note_lost(host, heartbeat)
         self._refused[host] = heartbeat, now_s
         if len(self._refused) > _MOST_HOLDERS:
             del self._refused[next(iter(self._refused))]
 
-    def repeats_refused(self, host: str, heartbeat: int | None, now_s: float) -> bool:
-        """Decide whether a write brings no other heartbeat than the host's last refused one: by that of a program that hung
-        while another master owned, the machine would press when that one stops. heartbeat: None where it brings none."""
-        if host not in self._refused or heartbeat not in (None, self._refused[host][0]):
+    def repeats(self, host: str, heartbeat: int | None, now_s: float, *, takes: bool = False) -> bool:
+        """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
+        was refused last: by the frame of a program that hung while another master owned, the machine would press when that one
+        stops. heartbeat: None where it brings none: the one that stands may be nobody's; takes: it takes over, as who is
+        refused is told to."""
+        if host in self.lost and heartbeat in (None, self.lost[host]):
+            return True
+        if takes or host not in self._refused or heartbeat not in (None, self._refused[host][0]):
             return False
         refused, refused_s = self._refused.pop(host)
         if now_s - refused_s >= _HELD_S:
@@ -97,12 +104,8 @@ class HeldEnables:
         """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
         return host in self.by_host or host in self.lost or host in self._lost_now or host in self._refused
 
-    def holds(self, host: str, now_s: float, heartbeat: int | None = None) -> bool:
-        """Decide whether a 1 of this host is one that it has kept up since the fault, or since its loss in the process before.
-        If so, it goes on being kept up. heartbeat: what it writes beside it, None where it writes none: the one that stands
-        may be nobody's."""
-        if host in self.lost and heartbeat in (None, self.lost[host]):
-            return True
+    def holds(self, host: str, now_s: float) -> bool:
+        """Decide whether a 1 of this host is one that it has kept up since the fault. If so, it goes on being kept up."""
         if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
             self._forget(host)
             return False
@@ -134,5 +137,7 @@ class HeldEnables:
 
     def restore(self, held: Mapping[str, float], lost: Mapping[str, int], now_s: float) -> None:
         """Go on with who was lost, and with what was held in the process before, as long as that can have been a moment ago."""
-        self.lost, self._lost_now = dict(lost), dict(lost)
-        self.by_host.update((host, now_s) for host, held_s in held.items() if now_s - held_s < _HELD_S + _DOWN_S)
+        for host, heartbeat in lost.items():
+            self.note_lost(host, heartbeat)
+        self.lost = dict(self._lost_now)
+        self.by_host.update((host, now_s) for host, held_s in held.items() if 0.0 <= now_s - held_s < _HELD_S + _DOWN_S)

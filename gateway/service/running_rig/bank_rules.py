@@ -19,6 +19,7 @@ def bank_rules(rig: Rig) -> BankRules:
         supported_bits=rig.supported_bits,
         require_byte_order_echo=rig.network.require_byte_order_echo,
         owner=rig.network.owner,
+        has_lease=rig.control.supervision.lease_s is not None,
     )
 
 

@@ -1,10 +1,12 @@
-"""What a control process leaves, through the guardian, to the one that is started when it dies.
+"""What a control process leaves, through the guardian, to the one that is started when it dies, and a gateway that has ended
+cleanly, in its state directory, to the next one.
 
 By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
 - a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
-  with the heartbeat with which it was lost, presses nothing, although fault and loss are forgotten;
+  with the heartbeat with which it was lost, or which it has written before, presses nothing, although fault and loss are
+  forgotten (this alone behind a clean end, too: a service is restarted by who wonders why the machine stands);
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten,
   until the next one: behind a second death it is missing as well.
 """
@@ -17,6 +19,14 @@ from gateway.service.running_rig.recording.wanted_recording import WantedRecordi
 
 _LEAST_TOLD_N: Final = 0.05
 _OWN: Final = "the rig's own"
+_HELD: Final = {"held_runs": int, "held_enables": float, "lost_beats": int}
+
+
+def left_of(kept: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of this counts behind a clean end, too: by which bits and heartbeats nothing begins. What is no such fact,
+    whatever has become of its file, is left out."""
+    facts = {name: kept[name] for name in _HELD if isinstance(kept.get(name), dict) and kept[name]}
+    return {name: held for name, held in facts.items() if all(type(one) is _HELD[name] for one in held.values())}
 
 
 class Handover:
@@ -32,14 +42,19 @@ class Handover:
         """The port of each TLS face, by its place in `fieldbus`, as masters know it."""
         return dict(self._kept.get("tls_ports", {}))
 
-    def restore_held(self, bank: RegisterBank, now_s: float, keep: Callable[..., None]) -> None:
-        """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep)."""
-        bank.held_runs.restore(self._kept.get("held_runs", {}))
-        held, lost = self._kept.get("held_enables", {}), self._kept.get("lost_beats", {})
-        bank.held_enables.restore(held, lost, now_s)
+    def restore_held(
+        self, bank: RegisterBank, now_s: float, keep: Callable[..., None], left_beat: int | None = None
+    ) -> None:
+        """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep).
+        left_beat: heartbeat of who owned when the process before died; None: nobody knows."""
         bank.held_enables.on_lost = lambda lost: keep(lost_beats=lost)
         bank.held_runs.on_change = lambda held: keep(held_runs=held)
         bank.held_enables.on_change = lambda held: keep(held_enables=held)
+        bank.held_runs.restore(self._kept.get("held_runs", {}))
+        held, lost, owner = (self._kept.get(name) for name in ("held_enables", "lost_beats", "owner"))
+        last = {owner: left_beat} if owner is not None and left_beat is not None else {}
+        keep(owner=None)
+        bank.held_enables.restore(held or {}, {**(lost or {}), **last}, now_s)
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""

@@ -37,7 +37,7 @@ from gateway.service.running_rig.bank_rules import bank_rules
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.control_loop import ControlLoop, LoopProcess
 from gateway.service.running_rig.faces.faces import Faces
-from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.handover import Handover, left_of
 from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.load_cell_line import CellExchange
@@ -166,7 +166,7 @@ class RunningRig:
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(starting.cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
-        handover.restore_held(self.bank, time.monotonic(), self._guardian.keep)
+        handover.restore_held(self.bank, time.monotonic(), self._guardian.keep, self._guardian.left_beat)
         self.controller.forget_tare(handover.forgotten_zero_n)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
@@ -256,6 +256,7 @@ class RunningRig:
         """Ramp the force to 0, then send the safe voltage (at most 4.5 s); at once where nobody guards it, or it fails."""
         controller, guardian, until_s = self.controller, self._guardian, time.monotonic() + _STOP_BOUND_S
         controller.stop()
+        self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)
         while time.monotonic() < until_s and not (controller.has_stopped or guardian.is_gone or self.failed.is_set()):
             await asyncio.sleep(self._tick.period_s)
 
@@ -271,7 +272,7 @@ class RunningRig:
             await waiting.close()
         for part in (self._ports, self._upload, self._plants, self._counters, self._lateness):
             part.close()
-        self._shutdown_marker.clear()
+        self._shutdown_marker.clear(left_of(self._guardian.kept))
 
     def _on_internal_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
         """An exception that nobody expected: the process ends with the safe voltage, the guardian starts it again in OFF."""
@@ -286,7 +287,7 @@ class RunningRig:
         self._faces.note_tick(expirations / self._rig.loop_hz + late_s + self.loop.last_tick.slept_s)
         self._watchdogs.follow(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
-        self._guardian.heartbeat(now_s)
+        self._guardian.heartbeat(now_s, self.bank.owner, self.bank.command.heartbeat)
         self._control_socket.live.alarm_times.follow(self.loop.decision)
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)

@@ -134,6 +134,7 @@ class SmallRig:
         rules = BankRules(
             rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
+            has_lease=self.settings.supervision.lease_s is not None,
             supported_bits=BASIC_BITS
             | ControlBit.START_CALIBRATION
             | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0))

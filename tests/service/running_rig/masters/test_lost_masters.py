@@ -1,7 +1,6 @@
-"""Who is lost, and when: behind a takeover, and behind a crash, where what hangs presses nothing, and what goes on may."""
+"""Who is lost, and when: behind a takeover or a stop of another one, and beside one, where what hangs presses nothing."""
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
 
@@ -12,78 +11,9 @@ from gateway.modbus import Peer
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.registers.writes.held_starts import HeldEnables
-from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S, leased
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
-
-
-@pytest.mark.parametrize("action", LeaseAction)
-@pytest.mark.parametrize("beat", [7, 8])
-def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action: LeaseAction, beat: int) -> None:
-    """The next process knew of no loss: 12 N for another lease, or held until somebody came. Its next beat counts."""
-    kept: dict[str, Any] = {}
-    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
-    for rig in rigs:
-        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
-        frame = rig.block(ENABLE, 12.0, beat=7)
-        rig.beats = False
-        for _ in range(20):
-            rig.answer(0, *frame)
-            rig.run(0.1)
-    assert kept["lost_beats"] == {OWNER.host: 7}
-    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
-    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
-    rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
-    assert (rigs[1].run(0.1).state is State.OFF) is (beat == 7)
-
-
-@pytest.mark.parametrize("action", LeaseAction)
-def test_behind_a_crash_the_frames_of_a_hung_program_press_not_whichever_comes_first(action: LeaseAction) -> None:
-    """Setpoint and heartbeat came in two frames: the next process judged the first by a heartbeat that nobody had written, and
-    12 N were held until somebody came."""
-    kept: dict[str, Any] = {}
-    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
-    for rig in rigs:
-        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
-        rig.beats = False
-        for _ in range(20):
-            rig.answer(0, ENABLE, 1200)
-            rig.answer(4, 7)
-            rig.run(0.1)
-    assert kept["lost_beats"] == {OWNER.host: 7}
-    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
-    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
-    rigs[1].write(4, 8)
-    rigs[1].run(3.0).write(0, ENABLE, 1200)
-    assert rigs[1].run(0.1).state is not State.OFF, "its program goes on"
-
-
-@pytest.mark.parametrize(
-    ("writes", "is_found"),
-    [((0, ENABLE, 1200, 0, 0, 7), False), ((4, 7), False), ((1, 0), False), ((0, 0), True), ((4, 8), True)],
-)
-@pytest.mark.parametrize("behind_a_crash", [False, True])
-def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
-    writes: tuple[int, ...], is_found: bool, behind_a_crash: bool
-) -> None:
-    """A day later a crash came: its first enable with the heartbeat of that loss was refused, and writing 0 did not help."""
-    kept: dict[str, Any] = {}
-    rig = SmallRig(settings(lease_s=0.35))
-
-    def handed_over(rig: SmallRig) -> SmallRig:
-        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
-        return rig
-
-    handed_over(rig).write(0, ENABLE, 1200, 0, 0, 7)
-    rig.beats = False
-    rig.until(State.FAULT).run(1.0)
-    if behind_a_crash:
-        rig = handed_over(SmallRig(rig.settings))
-    rig.answer(*writes)
-    assert kept["lost_beats"] == ({} if is_found else {OWNER.host: 7})
-    refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
-    assert (refused is None) is is_found
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, RESET, TAKE, SmallRig
 
 
 @pytest.mark.parametrize("ago_s", [0.0, 0.2, 0.34])
@@ -152,6 +82,47 @@ def test_who_was_refused_beside_another_owner_enables_with_the_same_heartbeat(by
     assert rig.run(0.1).state is not State.OFF
 
 
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("hangs_s", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("by", ["the page's stop", "a coil", "a takeover that stops"])
+def test_the_frames_of_a_program_that_has_just_hung_undo_no_stop_of_another_one(
+    action: LeaseAction, hangs_s: float, by: str
+) -> None:
+    """Within its lease it was no lost master: behind a stop its next frame pressed 12 N, for good where they are held."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=action))
+    rig.beats = False
+    for beat in range(1, 20):
+        rig.run(0.05).write(0, *(frame := (ENABLE, 1200, 0, 0, beat)))
+    for _ in range(round(hangs_s / 0.05)):
+        rig.run(0.05).write(0, *frame)
+    assert rig.state is State.HOLDING
+    if by == "a takeover that stops":
+        rig.write(0, TAKE | ENABLE, peer=OTHER)
+    rig.bank.write_bits(0, [False], OTHER) if by == "a coil" else rig.write(0, 0, peer=OTHER)
+    began = len(rig.run(0.05).trace)
+    for _ in range(20):
+        refused = rig.run(0.05).answer(0, *frame)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert max(voltage_v for _, voltage_v, _ in rig.trace[began:]) == 0.0
+    rig.write(0, *frame[:4], 20)
+    assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("by", ["its own stop", "another one that comes long behind"])
+def test_a_stop_asks_for_no_beat_of_who_has_stopped_or_has_been_away(by: str) -> None:
+    rig = leased().holding()
+    rig.write(4, 4711)
+    rig.beats = False
+    if by == "its own stop":
+        rig.write(0, 0)
+    else:
+        rig.write(0, 0)
+        rig.run(1.0).write(0, ENABLE, 800, 0, 0, 1, peer=OTHER)
+        rig.run(0.1).write(0, 0, peer=OTHER)
+    rig.write(0, ENABLE, 1200, 0, 0, 4711)
+    assert rig.run(0.1).state is not State.OFF
+
+
 class Held(SmallRig):
     """12 N of 30 N are held for a master whose program hangs while its frame flows; some have taken over with it."""
 
@@ -185,6 +156,22 @@ def test_what_somebody_has_lowered_beside_a_lost_master_its_frames_do_not_raise(
     rig.write(0, *rig.frame[:4], 4711)
     rig.beats = True
     assert rig.run(6.0).plant.force_n == pytest.approx(30.0, abs=0.5), "it goes on"
+
+
+@pytest.mark.parametrize("ago_s", [0.0, 0.01, 0.05])
+def test_what_somebody_has_just_lowered_beside_a_lost_master_its_next_frame_does_not_raise(ago_s: float) -> None:
+    """Before the next step the force had not begun to fall: 12 N were no more than was held, and undid the 5 N for good."""
+    rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD)).holding()
+    rig.write(0, *(frame := (ENABLE, 1200, 0, 0, 4711)))
+    rig.beats = False
+    rig.run(LEASE_S + 0.1).write(0, *frame)
+    rig.write(1, 500, peer=OTHER)
+    rig.run(ago_s)
+    for _ in range(20):
+        refused = rig.answer(0, *frame)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+        rig.run(0.1)
+    assert rig.plant.force_n == pytest.approx(5.0, abs=0.5)
 
 
 def test_what_another_master_has_pressed_and_left_the_frames_of_one_that_hung_before_do_not_raise() -> None:
@@ -246,3 +233,24 @@ def test_the_masters_that_were_lost_are_sixty_four() -> None:
             held.note_lost(f"10.0.0.{number}", beat)
     held.note_lost(None, 5)
     assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4
+
+
+@pytest.mark.parametrize("lease_s", [None, LEASE_S])
+def test_who_keeps_enable_at_1_over_a_fault_takes_no_force_of_another_one_over_by_bit_3_of_its_frames(
+    lease_s: float | None,
+) -> None:
+    """They had been refused over the fault: somebody reset it and enabled 8 N, and the next one pressed 30 N."""
+    rig = SmallRig(settings(lease_s=lease_s)).faulted()
+    frame = ENABLE | TAKE, 3000, 0, 0, 139
+    for _ in range(10):
+        assert rig.run(0.1).answer(0, *frame, peer=OTHER)
+    rig.write(0, RESET, 0, 0, 0, 9000)
+    rig.write(0, ENABLE, 800, 0, 0, 9001)
+    for _ in range(30):
+        refused = rig.run(0.1).answer(0, *frame, peer=OTHER)
+        assert refused and refused.reason is RefusalReason.CALIBRATION_HELD
+    assert rig.bank.owner == OWNER.host and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+    rig.write(0, 0, peer=OTHER)
+    rig.write(0, ENABLE, 800, 0, 0, 9002)
+    rig.write(0, *frame, peer=OTHER)
+    assert rig.bank.owner == OTHER.host, "behind its own 0 it counts"

@@ -1,0 +1,135 @@
+"""Behind the death of a control process: what hangs presses nothing, and what goes on may."""
+
+from typing import Any
+
+import pytest
+
+from gateway.codes.refusals import RefusalReason
+from gateway.control import LeaseAction
+from gateway.registers import Refusal
+from gateway.registers.words import State
+from gateway.service.running_rig.handover import Handover
+from tests.control.bench import settings
+from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
+
+HUNG = (ENABLE, 3000, 0, 0, 139)
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize("beat", [7, 8])
+def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action: LeaseAction, beat: int) -> None:
+    """The next process knew of no loss: 12 N for another lease, or held until somebody came. Its next beat counts."""
+    kept: dict[str, Any] = {}
+    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
+    for rig in rigs:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        frame = rig.block(ENABLE, 12.0, beat=7)
+        rig.beats = False
+        for _ in range(20):
+            rig.answer(0, *frame)
+            rig.run(0.1)
+    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
+    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
+    rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
+    assert (rigs[1].run(0.1).state is State.OFF) is (beat == 7)
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+def test_behind_a_crash_the_frames_of_a_hung_program_press_not_whichever_comes_first(action: LeaseAction) -> None:
+    """Setpoint and heartbeat came in two frames: the next process judged the first by a heartbeat that nobody had written, and
+    12 N were held until somebody came."""
+    kept: dict[str, Any] = {}
+    rigs = [SmallRig(settings(lease_s=0.35, lease_action=action)) for _ in range(2)]
+    for rig in rigs:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.beats = False
+        for _ in range(20):
+            rig.answer(0, ENABLE, 1200)
+            rig.answer(4, 7)
+            rig.run(0.1)
+    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
+    assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
+    rigs[1].write(4, 8)
+    rigs[1].run(3.0).write(0, ENABLE, 1200)
+    assert rigs[1].run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize(
+    ("writes", "is_found"),
+    [((0, ENABLE, 1200, 0, 0, 7), False), ((4, 7), False), ((1, 0), False), ((0, 0), True), ((4, 8), True)],
+)
+@pytest.mark.parametrize("behind_a_crash", [False, True])
+def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
+    writes: tuple[int, ...], is_found: bool, behind_a_crash: bool
+) -> None:
+    """A day later a crash came: its first enable with the heartbeat of that loss was refused, and writing 0 did not help."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(settings(lease_s=0.35))
+
+    def handed_over(rig: SmallRig) -> SmallRig:
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        return rig
+
+    handed_over(rig).write(0, ENABLE, 1200, 0, 0, 7)
+    rig.beats = False
+    rig.until(State.FAULT).run(1.0)
+    if behind_a_crash:
+        rig = handed_over(SmallRig(rig.settings))
+    rig.answer(*writes)
+    assert kept["lost_beats"] == ({} if is_found else {OWNER.host: 7})
+    refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
+    assert (refused is None) is is_found
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+@pytest.mark.parametrize(
+    "ends", ["dies", "dies twice", "is stopped by another one, then dies", "is refused, then dies"]
+)
+def test_behind_a_death_the_frames_of_a_program_that_has_just_hung_press_not(action: LeaseAction, ends: str) -> None:
+    """Within its lease it was no lost master yet, and who was refused beside the owner none at all."""
+    kept: dict[str, Any] = {}
+    control = settings(lease_s=LEASE_S, lease_action=action)
+
+    def begun(left_beat: int | None) -> SmallRig:
+        rig = SmallRig(control)
+        hand = Handover(dict(kept), record=False).restore_held
+        hand(rig.bank, rig.now(), lambda **facts: kept.update(facts), left_beat)
+        rig.beats = False
+        return rig
+
+    def flow(rig: SmallRig, seconds: float) -> list[Refusal | None]:
+        return [rig.run(0.05) and rig.answer(0, *HUNG, peer=OTHER) for _ in range(round(seconds / 0.05))]
+
+    rig = begun(None)
+    if ends.startswith("is refused"):
+        rig.write(0, ENABLE, 800, 0, 0, 1)
+    else:
+        rig.write(0, *HUNG[:4], 138, peer=OTHER)
+    flow(rig, 0.2)
+    if ends.startswith("is stopped"):
+        rig.write(0, 0)
+    kept["owner"] = rig.bank.owner  # as the guardian is told
+    for _ in range(2 if ends == "dies twice" else 1):
+        rig = begun(rig.bank.command.heartbeat)
+    assert kept["lost_beats"][OTHER.host] == 139 and kept["owner"] is None
+    for refused in flow(rig, 2.0):
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert (rig.state, rig.wire.voltage_v) == (State.OFF, 0.0)
+    rig.write(0, *HUNG[:4], 140, peer=OTHER)
+    assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+def test_behind_a_death_a_hung_program_takes_no_force_of_a_living_master_over_by_bit_3_of_its_last_frame() -> None:
+    kept: dict[str, Any] = {"lost_beats": {OTHER.host: 139}}
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    Handover(kept, record=False).restore_held(rig.bank, rig.now(), lambda **facts: None)
+    rig.write(0, ENABLE, 800, 0, 0, 1)
+    for _ in range(30):
+        refused = rig.run(0.1).answer(0, ENABLE | TAKE, *HUNG[1:], peer=OTHER)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.bank.owner == OWNER.host and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
+    rig.write(0, ENABLE | TAKE, *HUNG[1:4], 140, peer=OTHER)
+    assert rig.bank.owner == OTHER.host, "its program goes on"
