@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gateway.live.live_state import LiveForce, LiveLine, LiveLoop, LiveState
+from gateway.live.live_state import LiveForce, LiveLine, LiveLoop, LiveRecording, LiveState
 from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 from tests.web.tabs.scripted_control import ScriptedControl
 
@@ -187,3 +187,26 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
     assert told["columns"] == {"time_s": [1, 2, 3, 4], "force_n": [10, 20, 30, 40]}
     assert told["asked"] == ["setpoint", "enable"]
     browser.close()
+
+
+RECORD = """async (states) => {
+  const { makeSteering } = await import("/static/live/steering.js");
+  const asked = [];
+  const steering = makeSteering({ post: async (path, body) => asked.push([path, body]), say: () => {} });
+  for (const state of states) {
+    steering.state(state);
+    const words = state.recording.on ? "Stop recording" : "Record";
+    Array.from(steering.element.querySelectorAll("button")).find((one) => one.textContent === words).click();
+  }
+  return asked;
+}"""
+
+
+def test_the_button_of_a_recording_does_what_it_says(page, chromium) -> None:
+    """One that asked for a recording under way once more would never have ended it."""
+    base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off")
+    states = [base, replace(base, recording=LiveRecording(on=True, number=1))]
+    window: Any = open_tab(chromium, page.address, "wiring")
+    asked = window.evaluate(RECORD, [each.to_json() for each in states])
+    assert asked == [["/api/v1/command/record", {"on": True}], ["/api/v1/command/record", {"on": False}]]
+    window.close()
