@@ -122,6 +122,11 @@ def test_a_plan_of_ones_own_takes_numbers_as_they_are_typed_and_no_others(page, 
     go.click()
     window.locator("#tab-calibrate .told.bad").get_by_text("Stair (V): a number, such as 0.2.").wait_for()
     assert [plan["step_v"] for plan in asked] == [0.05]
+    stair.fill("0.1")
+    window.get_by_label("Take the force at rest as zero first").check()
+    with window.expect_response("**/api/v1/calibrate/preview"):
+        go.click()
+    assert [(plan["step_v"], plan.get("tare", False)) for plan in asked] == [(0.05, False), (0.1, True)]
     window.close()
 
 
