@@ -55,6 +55,13 @@ def test_among_many_fleets_without_a_drift_hardly_one_is_accused() -> None:
     assert accused <= 300 * ALPHA * 3
 
 
+def test_a_day_of_more_recordings_has_no_more_of_a_cause() -> None:
+    """The creep that every recording has would be why a cell drifts that is recorded more often by now."""
+    days = [(day, each) for day in range(8) for each in range(1 + day)]
+    rows = [row("a", day, 0.3 + 0.1 * day + 0.001 * each, ("creep", 0.3), ("leak", 0.1 * day)) for day, each in days]
+    assert [(one.cause, one.cause_n) for one in find_drifts(rows)] == [("leak", pytest.approx(0.7))]
+
+
 def test_a_trend_that_nobody_would_mind_is_none() -> None:
     rows = [row("a", day, 0.3 + 0.001 * day) for day in range(10)]
     (cell,) = find_drifts(rows)
