@@ -132,9 +132,11 @@ def test_a_cell_that_gets_better_has_changed_as_well_by_what_has_gone_and_not_by
 
 def test_the_page_answers_first_and_hides_no_name_of_a_file() -> None:
     rows = [*fleet(np.random.default_rng(1), 3, 8, slope_n=0.1), row("<b>", 1, 0.0, error="E403")]
+    rows[-1]["error"] = "line 3, force_n: '<b>1' is no number"
     text = fleet_page(rows, find_drifts(rows), "diagnose")
     assert "<h1>1 of 4 cells drifts: cell 0 (leak," in text
-    assert "&lt;b&gt;" in text and "<b>" not in text
+    assert text.count("&lt;b&gt;") >= 2 and "&lt;b&gt;1" in text and "<b>" not in text
+    assert "<dd>24</dd><dd class='unit'>read</dd>" in text and "<dd>1</dd><dd class='unit'>recordings</dd>" in text
     assert text.count("<figure") >= 3
 
 
