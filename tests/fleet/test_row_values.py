@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.bsfm import Branches, RationalBezier
+from gateway.cli.fleet.files import cell_row, day_rows
 from gateway.cli.fleet.rows import Question, diagnose_row, fit_row
 from gateway.diagnosis import Diagnosis, Options
 from gateway.fleet.drift import _holm, find_drifts, undated
@@ -100,6 +101,26 @@ def test_what_has_no_answer_is_not_counted_as_without_a_day() -> None:
     rows = [row("a", 1, 1.0), row("a", 2, 0.0, error="E403"), row("a", 3, 1.0)]
     rows = [each | {"date": "3.11.2026"} for each in rows]
     assert undated(rows) == [rows[0], rows[2]]
+
+
+def test_days_and_cells_are_written_as_they_were_found() -> None:
+    rows = [
+        row("a", 0, 1.0, ("leak", 0.1)),
+        row("a", 0, 3.0),
+        row("a", 0, 0.0, error="E403"),
+        row("a", 1, 0.0, error="E1"),
+    ]
+    whole, broken = day_rows(rows)
+    assert whole == {
+        "cell": "a", "date": "2026-11-01", "recordings": 3, "errors": 1, "value_n": 2.0, "causes": ["leak"],
+    }  # fmt: skip
+    assert (broken["recordings"], broken["errors"], broken["value_n"], broken["causes"]) == (1, 1, None, [])
+    (cell,) = find_drifts(row("a", day, 0.5 * day + 0.1 * (day % 2), ("leak", 0.1 * day)) for day in range(6))
+    trend, told = cell.trend, cell_row(cell)
+    assert trend is not None and trend.low < trend.slope_n_per_day < trend.high
+    names = ("slope_low_n_per_day", "slope_n_per_day", "slope_high_n_per_day", "chance")
+    assert [told[name] for name in names] == [trend.low, trend.slope_n_per_day, trend.high, trend.chance]
+    assert (told["change_n"], told["cause"], told["cause_n"]) == (cell.change_n, "leak", pytest.approx(0.5))
 
 
 def test_a_day_is_its_median_and_its_trend_is_drawn_the_way_that_it_goes() -> None:
