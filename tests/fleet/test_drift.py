@@ -146,3 +146,10 @@ def test_a_cell_is_told_by_its_whole_name_whatever_stands_in_it(capsys: pytest.C
     print_cells(cells)
     told = capsys.readouterr().out
     assert all(one.cell in told for one in cells) and len(cells) == 3
+
+
+def test_of_more_cells_than_are_shown_the_rest_is_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    cells = find_drifts(row(f"{cell:02d}", day, float(day)) for cell in range(23) for day in range(8))
+    assert headline(cells).startswith("23 of 23 cells drift: cell 00 (") and headline(cells).endswith("; and 20 more")
+    print_cells(cells)
+    assert capsys.readouterr().out.endswith("and 3 cells more: cells.parquet has all\n")
