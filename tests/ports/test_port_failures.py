@@ -69,10 +69,13 @@ def test_a_member_who_has_not_logged_in_again_is_told_so(
     assert "usermod" not in str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
 
 
-def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None) -> None:
-    os.chmod(line.path, 0o600)  # noqa: PTH101
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o620])
+def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None, mode: int) -> None:
+    """Or of which its group may do half: to be in that one helps nobody."""
+    os.chmod(line.path, mode)  # noqa: PTH101
+    os.chown(line.path, -1, 20)
     told = str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
-    assert f"(mode 0600 anna:dialout): sudo chgrp dialout {line.path}" in told
+    assert f"(mode {mode:04o} anna:dialout): sudo chgrp dialout {line.path}" in told
 
 
 def test_a_missing_port_lists_those_that_are_there(ear: Any, monkeypatch: pytest.MonkeyPatch) -> None:
