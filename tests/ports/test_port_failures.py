@@ -13,7 +13,8 @@ import pytest
 import serial
 from serial import SerialException
 
-from gateway.ports import PortError, Pty
+from gateway.devices import SerialSettings
+from gateway.ports import PortError, PortEvents, Pty, SerialPort
 from gateway.ports.errors import explain_loss, explain_open_failure
 
 
@@ -147,3 +148,25 @@ def test_a_speed_that_no_uart_has_is_told(ear: Any, line: Pty, monkeypatch: pyte
 
     monkeypatch.setattr("serial.serialposix.Serial._reconfigure_port", refusing)
     assert "Invalid baud rate" in str(asyncio.run(told_by_opening(ear, line.path)))
+
+
+def test_a_port_that_its_owner_refuses_is_free_for_the_next_try(line: Pty) -> None:
+    """It would be held by this very process until that ends."""
+    refusals = [PortError("E111", "another device answers")]
+
+    def on_open(descriptor: int) -> None:
+        if refusals:
+            raise refusals.pop()
+
+    async def scene() -> None:
+        port = SerialPort(
+            line.path, SerialSettings(baud=9600), PortEvents(lambda *_: None, lambda failure: None, on_open)
+        )
+        with pytest.raises(PortError, match="another device answers"):
+            await port.open()
+        assert not port.is_open and not port.write(b"SET 0\r\n")
+        await port.open()
+        assert port.is_open and port.write(b"SET 0\r\n")
+        port.close()
+
+    asyncio.run(scene())

@@ -91,6 +91,7 @@ def test_low_latency_is_asked_of_the_driver(monkeypatch: pytest.MonkeyPatch) -> 
     asked: list[tuple[int, bytes]] = []
 
     def driver(descriptor: int, request: int, data: bytes) -> bytes:
+        data = data if asked else data[:16] + bytes((0x40, 0, 0, 0)) + data[20:]
         asked.append((request, data))
         return data
 
@@ -98,7 +99,8 @@ def test_low_latency_is_asked_of_the_driver(monkeypatch: pytest.MonkeyPatch) -> 
     assert set_low_latency(3, "/dev/ttyUSB9") == ""
     (_, before), (request, after) = asked
     assert request == 0x541F
-    assert int.from_bytes(after[16:20], "little") == int.from_bytes(before[16:20], "little") | 1 << 13
+    assert int.from_bytes(after[16:20], "little") == 0x40 | 1 << 13, "the other flags of the port stay"
+    assert (before[:16], before[20:]) == (after[:16], after[20:])
 
 
 def test_a_pty_has_no_latency_and_no_warning(line: Pty) -> None:
