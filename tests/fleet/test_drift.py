@@ -55,6 +55,13 @@ def test_among_many_fleets_without_a_drift_hardly_one_is_accused() -> None:
     assert accused <= 300 * ALPHA * 3
 
 
+def test_a_day_of_more_recordings_has_no_more_of_a_cause() -> None:
+    """The creep that every recording has would be why a cell drifts that is recorded more often by now."""
+    days = [(day, each) for day in range(8) for each in range(1 + day)]
+    rows = [row("a", day, 0.3 + 0.1 * day + 0.001 * each, ("creep", 0.3), ("leak", 0.1 * day)) for day, each in days]
+    assert [(one.cause, one.cause_n) for one in find_drifts(rows)] == [("leak", pytest.approx(0.7))]
+
+
 def test_a_trend_that_nobody_would_mind_is_none() -> None:
     rows = [row("a", day, 0.3 + 0.001 * day) for day in range(10)]
     (cell,) = find_drifts(rows)
@@ -125,9 +132,11 @@ def test_a_cell_that_gets_better_has_changed_as_well_by_what_has_gone_and_not_by
 
 def test_the_page_answers_first_and_hides_no_name_of_a_file() -> None:
     rows = [*fleet(np.random.default_rng(1), 3, 8, slope_n=0.1), row("<b>", 1, 0.0, error="E403")]
+    rows[-1]["error"] = "line 3, force_n: '<b>1' is no number"
     text = fleet_page(rows, find_drifts(rows), "diagnose")
     assert "<h1>1 of 4 cells drifts: cell 0 (leak," in text
-    assert "&lt;b&gt;" in text and "<b>" not in text
+    assert text.count("&lt;b&gt;") >= 2 and "&lt;b&gt;1" in text and "<b>" not in text
+    assert "<dd>24</dd><dd class='unit'>read</dd>" in text and "<dd>1</dd><dd class='unit'>recordings</dd>" in text
     assert text.count("<figure") >= 3
 
 
@@ -137,3 +146,10 @@ def test_a_cell_is_told_by_its_whole_name_whatever_stands_in_it(capsys: pytest.C
     print_cells(cells)
     told = capsys.readouterr().out
     assert all(one.cell in told for one in cells) and len(cells) == 3
+
+
+def test_of_more_cells_than_are_shown_the_rest_is_counted(capsys: pytest.CaptureFixture[str]) -> None:
+    cells = find_drifts(row(f"{cell:02d}", day, float(day)) for cell in range(23) for day in range(8))
+    assert headline(cells).startswith("23 of 23 cells drift: cell 00 (") and headline(cells).endswith("; and 20 more")
+    print_cells(cells)
+    assert capsys.readouterr().out.endswith("and 3 cells more: cells.parquet has all\n")

@@ -3,10 +3,12 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, NamedTuple, Self
 
 import pytest
 
-from gateway.fleet.engines import Compute, Engine, processes, run_serially
+from gateway.fleet.engines import Compute, Engine, cluster, processes, run_serially
 from gateway.fleet.tasks import Row, Task, find_tasks
 from tests.fleet.workers import count_bytes, die_at_some
 
@@ -62,6 +64,64 @@ def on_a_cluster(*words: str) -> str:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()[-1]
+
+
+class FakeDistributed:
+    """Keeps futures by their keys, as a scheduler does: two of one key are one."""
+
+    def __init__(self, failures: dict[str, Exception]) -> None:
+        self._failures = failures
+
+    loop = None
+
+    def Client(self, address: str, **options: Any) -> Self:  # noqa: N802, its own name
+        return self
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, *error: object) -> None:
+        pass
+
+    def submit(self, compute_row: Any, compute: Compute, task: Task, *, key: str, retries: int) -> Any:
+        failure = self._failures.get(Path(task.path).read_text())
+        row = None if failure else compute_row(compute, task)
+        return Future(key, SimpleNamespace(row=row, failure=failure))
+
+    def as_completed(self, futures: list[Any], **options: Any) -> list[Any]:
+        return futures
+
+
+class Future(NamedTuple):
+    key: str
+    of: Any
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Future) and self.key == other.key
+
+    def exception(self) -> Exception | None:
+        found: Exception | None = self.of.failure
+        return found
+
+    def result(self) -> Row:
+        row: Row = self.of.row
+        return row
+
+
+def test_on_a_cluster_each_copy_has_its_row_and_only_a_death_is_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A copy of a recording elsewhere is the same bytes; a worker of another version has computed nothing, and has not died."""
+    tasks = folder_of(tmp_path, "same", "same", "deadly", "other version")
+    failures = {"deadly": type("KilledWorker", (Exception,), {})("x"), "other version": ValueError("no such module")}
+    monkeypatch.setattr("gateway.fleet.engines.import_library", lambda name: FakeDistributed(failures))
+    rows = rows_of(cluster("tcp://10.0.0.5:8786"), count_bytes, tasks)
+    told = {Path(row["file"]).parent.name[-2:]: (row["error_code"], row["error"][:17]) for row in rows}
+    nothing = ("", "")
+    assert told == {"01": nothing, "02": nothing, "03": ("E192", "the process that "), "04": ("E403", "no such module")}
 
 
 @pytest.mark.long

@@ -47,6 +47,15 @@ def test_an_error_that_grows_is_told_before_what_is_refitted() -> None:
     assert [(one.cause, one.is_refitted) for one in find_drifts(rows) if one.drifts] == [("leak", False)]
 
 
+@pytest.mark.parametrize("steepest", ["coulomb-friction", "lag_s"])
+def test_of_two_numbers_that_drift_in_a_cell_the_one_that_changes_most_is_told(steepest: str) -> None:
+    rng, rows = np.random.default_rng(3), fleet(np.random.default_rng(3), 0.0)
+    for day, each in enumerate(rows[:8]):
+        for number in each["refitted"]:
+            number["by_n"] = (-0.2 if number["name"] == steepest else 0.1) * day + rng.normal(0.0, 0.02)
+    assert [(one.cell, one.cause) for one in find_drifts(rows) if one.drifts] == [("0", steepest)]
+
+
 @pytest.mark.long
 def test_among_many_fleets_without_a_drift_hardly_one_is_accused() -> None:
     rng, accused = np.random.default_rng(7), 0

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 
 from gateway.bsfm import Branches, RationalBezier
+from gateway.cli.fleet.files import cell_row, day_rows
 from gateway.cli.fleet.rows import Question, diagnose_row, fit_row
-from gateway.fleet.drift import _holm, find_drifts
+from gateway.diagnosis import Diagnosis, Options
+from gateway.fleet.drift import _holm, find_drifts, undated
 from gateway.fleet.page import fleet_page
 from gateway.fleet.tasks import Task, find_tasks
 from tests.fleet.test_drift import row
@@ -23,16 +25,23 @@ def test_of_a_diagnosis_the_drift_is_watched_beyond_the_noise_and_a_cause_s_gain
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[Any] = []
+    known = {"calibration_noise_n": 0.02, "late_s": 0.3, "quantum_n": 0.01, "is_own": True}
+
+    def search(measurements: list[Any], plant: str, options: Options) -> Diagnosis:
+        told.append((plant, options))
+        return diagnosis(causes=(FRICTION,))
+
+    told: list[Any] = []
 
     def read(files: list[str], **options: Any) -> SimpleNamespace:
         asked.append((files, options["rig"], options["columns"]))
-        facts = dict.fromkeys(("calibration_noise_n", "late_s", "quantum_n"), None)
-        return SimpleNamespace(measurements=[], plant=SimpleNamespace(plant=None), is_own=False, **facts)
+        return SimpleNamespace(measurements=[], plant=SimpleNamespace(plant="its rig's"), **known)
 
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
     monkeypatch.setattr("gateway.cli.diagnosis.inputs.read_sources", read)
-    monkeypatch.setattr("gateway.diagnosis.diagnose", lambda *given: diagnosis(causes=(FRICTION,)))
+    monkeypatch.setattr("gateway.diagnosis.diagnose", search)
     found = diagnose_row(Question("cell-7", "map.yaml"), TASK)
+    assert told == [("its rig's", Options(**known))], "what the recording's own rig says goes into the search"
     assert asked == [([TASK.path], "cell-7", "map.yaml")]
     assert (found["rms_before_n"], found["rms_after_n"], found["floor_n"]) == (1.186, 0.257, 0.12)
     assert found["value_n"] == pytest.approx(sqrt(1.186**2 - 0.12**2))
@@ -77,6 +86,41 @@ def test_behind_the_first_cell_that_drifts_the_next_is_judged_among_the_others()
     assert _holm({"a": 0.004, "b": 0.009, "c": 0.5}) == set()
     assert _holm({"a": 0.003, "b": 0.0049, "c": 0.5}) == {"a", "b"}
     assert _holm({"a": 0.003, "b": 0.009, "c": 0.5}) == {"a"}
+
+
+def test_a_cell_is_judged_as_one_of_all_that_were_asked() -> None:
+    """By itself each is sure of a trend, for its six days rise one by one: among twenty, chance gives that often enough."""
+    rows = [
+        row(str(cell), day, value_n) for cell in range(20) for day, value_n in enumerate((0.0, 0.1, 0.2, 0.3, 0.4, 9.0))
+    ]
+    assert [one.drifts for one in find_drifts(rows[:6])] == [True]
+    assert not any(one.drifts for one in find_drifts(rows))
+
+
+def test_what_has_no_answer_is_not_counted_as_without_a_day() -> None:
+    rows = [row("a", 1, 1.0), row("a", 2, 0.0, error="E403"), row("a", 3, 1.0)]
+    rows = [each | {"date": "3.11.2026"} for each in rows]
+    assert undated(rows) == [rows[0], rows[2]]
+
+
+def test_days_and_cells_are_written_as_they_were_found() -> None:
+    rows = [
+        row("a", 0, 1.0, ("leak", 0.1)),
+        row("a", 0, 3.0),
+        row("a", 0, 0.0, error="E403"),
+        row("a", 1, 0.0, error="E1"),
+    ]
+    whole, broken = day_rows(rows)
+    assert whole == {
+        "cell": "a", "date": "2026-11-01", "recordings": 3, "errors": 1, "value_n": 2.0, "causes": ["leak"],
+    }  # fmt: skip
+    assert (broken["recordings"], broken["errors"], broken["value_n"], broken["causes"]) == (1, 1, None, [])
+    (cell,) = find_drifts(row("a", day, 0.5 * day + 0.1 * (day % 2), ("leak", 0.1 * day)) for day in range(6))
+    trend, told = cell.trend, cell_row(cell)
+    assert trend is not None and trend.low < trend.slope_n_per_day < trend.high
+    names = ("slope_low_n_per_day", "slope_n_per_day", "slope_high_n_per_day", "chance")
+    assert [told[name] for name in names] == [trend.low, trend.slope_n_per_day, trend.high, trend.chance]
+    assert (told["change_n"], told["cause"], told["cause_n"]) == (cell.change_n, "leak", pytest.approx(0.5))
 
 
 def test_a_day_is_its_median_and_its_trend_is_drawn_the_way_that_it_goes() -> None:

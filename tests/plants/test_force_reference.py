@@ -131,6 +131,7 @@ def test_a_header_says_which_plant_was_in_use_or_nothing(said: object, read: dic
         {"number": 1, "cell": {"quadratic_per_n": "a"}},
         {"number": 1, "cell": {"quadratic_per_n": None}},
         {"number": 1, "cell": {"zero_n": inf}},
+        {"number": 1, "cell": {"zero_n": -inf}},
         {"number": 1, "cell": {"zero_n": 10**400}},
     ],
 )

@@ -97,6 +97,23 @@ def test_a_response_that_was_measured_on_this_very_rig_leaves_its_timing_to_the_
     compensated = compensation_on(foreign, slow).acts
     assert compensated
     assert [name for name, why in compensation_on(own, slow).limited if "has measured it" in why] == list(compensated)
+    unmeasured = replace(own, calibration=replace(own.calibration, response=None))
+    assert compensation_on(unmeasured, slow).acts == compensated, "its ladder has measured no response"
+
+
+def test_what_the_rigs_own_plant_has_as_well_is_taken_back_too():
+    """Control knows nothing of these effects, whichever plant has them."""
+    rig = replace(load_rig("demo"), plant_profile=bowed())
+    assert compensation_on(rig, bowed()).acts == ("command-nonlinearity",)
+
+
+def test_a_plant_that_was_found_elsewhere_is_doubted_on_a_real_rig_alone():
+    rig, elsewhere = load_rig("demo"), replace(numbered(), provenance=replace(TOLD, rig="press-left"))
+    told = [with_plant_in_use(each, elsewhere).plant_in_use for each in (rig, replace(rig, simulated=False))]
+    assert [each is not None and 'was found on "press-left", not on demo' in each.doubts for each in told] == [
+        False,
+        True,
+    ]
 
 
 def test_a_simulated_rig_is_not_told_how_its_tool_is_held():

@@ -159,3 +159,25 @@ def test_a_waiting_wire_does_not_spin(ear: Any) -> None:
         return len(ear.times_s)
 
     assert asyncio.run(scene()) <= 14
+
+
+def test_what_was_on_the_wire_when_the_plug_was_pulled_comes_to_nobody(ear: Any) -> None:
+    """Neither to the device, whose pty is gone, nor as an error of the loop."""
+    errors = list[Any]()
+
+    async def scene() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda loop, told: errors.append(told))
+        device, other = paced(ear, 9600), type(ear)()
+        client = other.port(device.path)
+        await client.open()
+        client.write(b"SET 512\r\n")
+        while device._inward._timer is None:
+            await asyncio.sleep(0.0)
+        device.send(b"1023\r\n")
+        timers = [flow._timer for flow in (device._inward, device._outward)]
+        device.close()
+        assert all(timer is not None and timer.cancelled() for timer in timers)
+        client.close()
+
+    asyncio.run(scene())
+    assert (ear.data, errors) == (b"", [])

@@ -13,7 +13,8 @@ import pytest
 import serial
 from serial import SerialException
 
-from gateway.ports import PortError, Pty
+from gateway.devices import SerialSettings
+from gateway.ports import PortError, PortEvents, Pty, SerialPort
 from gateway.ports.errors import explain_loss, explain_open_failure
 
 
@@ -69,10 +70,13 @@ def test_a_member_who_has_not_logged_in_again_is_told_so(
     assert "usermod" not in str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
 
 
-def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None) -> None:
-    os.chmod(line.path, 0o600)  # noqa: PTH101
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o620])
+def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None, mode: int) -> None:
+    """Or of which its group may do half: to be in that one helps nobody."""
+    os.chmod(line.path, mode)  # noqa: PTH101
+    os.chown(line.path, -1, 20)
     told = str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
-    assert f"(mode 0600 anna:dialout): sudo chgrp dialout {line.path}" in told
+    assert f"(mode {mode:04o} anna:dialout): sudo chgrp dialout {line.path}" in told
 
 
 def test_a_missing_port_lists_those_that_are_there(ear: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,3 +148,25 @@ def test_a_speed_that_no_uart_has_is_told(ear: Any, line: Pty, monkeypatch: pyte
 
     monkeypatch.setattr("serial.serialposix.Serial._reconfigure_port", refusing)
     assert "Invalid baud rate" in str(asyncio.run(told_by_opening(ear, line.path)))
+
+
+def test_a_port_that_its_owner_refuses_is_free_for_the_next_try(line: Pty) -> None:
+    """It would be held by this very process until that ends."""
+    refusals = [PortError("E111", "another device answers")]
+
+    def on_open(descriptor: int) -> None:
+        if refusals:
+            raise refusals.pop()
+
+    async def scene() -> None:
+        port = SerialPort(
+            line.path, SerialSettings(baud=9600), PortEvents(lambda *_: None, lambda failure: None, on_open)
+        )
+        with pytest.raises(PortError, match="another device answers"):
+            await port.open()
+        assert not port.is_open and not port.write(b"SET 0\r\n")
+        await port.open()
+        assert port.is_open and port.write(b"SET 0\r\n")
+        port.close()
+
+    asyncio.run(scene())

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.ports import Pty, holders_of, list_ports
+from gateway.ports import Pty, holders, holders_of, list_ports
 from gateway.ports.latency import latency_ms, set_low_latency
 from gateway.ports.listing import present_paths
 
@@ -56,6 +56,14 @@ def test_a_port_without_a_by_id_name_is_listed_by_its_device(tmp_path: Path) -> 
     assert present_paths(tmp_path / "dev", tmp_path / "sys") == [str(tmp_path / "dev/ttyAMA0")]
 
 
+def test_a_name_whose_adapter_is_gone_is_no_port(tmp_path: Path) -> None:
+    plug_in(tmp_path, "ttyUSB0", by_id="usb-FTDI_A10K-if00-port0")
+    (tmp_path / "dev/ttyUSB0").unlink()
+    (tmp_path / "sys/class/tty/ttyUSB0/device").unlink()
+    assert present_paths(tmp_path / "dev", tmp_path / "sys") == []
+    assert list_ports(tmp_path / "dev", tmp_path / "sys") == []
+
+
 def test_this_machines_ports_can_be_listed() -> None:
     assert all(info.device.startswith("/dev/") for info in list_ports())
 
@@ -83,6 +91,7 @@ def test_low_latency_is_asked_of_the_driver(monkeypatch: pytest.MonkeyPatch) -> 
     asked: list[tuple[int, bytes]] = []
 
     def driver(descriptor: int, request: int, data: bytes) -> bytes:
+        data = data if asked else data[:16] + bytes((0x40, 0, 0, 0)) + data[20:]
         asked.append((request, data))
         return data
 
@@ -90,7 +99,8 @@ def test_low_latency_is_asked_of_the_driver(monkeypatch: pytest.MonkeyPatch) -> 
     assert set_low_latency(3, "/dev/ttyUSB9") == ""
     (_, before), (request, after) = asked
     assert request == 0x541F
-    assert int.from_bytes(after[16:20], "little") == int.from_bytes(before[16:20], "little") | 1 << 13
+    assert int.from_bytes(after[16:20], "little") == 0x40 | 1 << 13, "the other flags of the port stay"
+    assert (before[:16], before[20:]) == (after[:16], after[20:])
 
 
 def test_a_pty_has_no_latency_and_no_warning(line: Pty) -> None:
@@ -102,3 +112,22 @@ def test_holders_are_found_and_the_locking_one_is_marked(line: Pty) -> None:
     assert (holder.pid, holder.is_locking, str(holder)) == (os.getpid(), False, "this very process")
     assert holders_of("/dev/ttyUSB99") == []
     assert holders_of(line.path, Path("/nowhere")) == []
+
+
+def test_who_locks_with_one_of_two_descriptors_locks_and_is_the_one_that_is_named(
+    line: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for pid, locking in ((11, "0"), (12, "1"), (13, "")):
+        for part in ("fd", "fdinfo"):
+            (tmp_path / str(pid) / part).mkdir(parents=True)
+        (tmp_path / str(pid) / "comm").write_text(f"p{pid}\n")
+        for number in ("0", "1"):
+            (tmp_path / str(pid) / "fd" / number).symlink_to(line.path)
+            (tmp_path / str(pid) / "fdinfo" / number).write_text("lock:\t1: FLOCK" if number == locking else "flags: 2")
+    found = holders_of(line.path, tmp_path)
+    assert sorted((each.pid, each.name, each.is_locking) for each in found) == [
+        (11, "p11", True), (12, "p12", True), (13, "p13", False),
+    ]  # fmt: skip
+    monkeypatch.setattr(holders, "holders_of", lambda path: sorted(found, key=lambda each: each.pid))
+    told = holders.describe_holders("/dev/ttyUSB0")
+    assert told == "/dev/ttyUSB0 is held by p11 (pid 11), p12 (pid 12); stop that one first"

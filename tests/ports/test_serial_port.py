@@ -5,6 +5,7 @@ import errno
 import fcntl
 import os
 import sys
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
@@ -200,6 +201,14 @@ def test_a_descriptor_given_to_the_guardian_does_not_keep_the_port_locked(ear: A
         os.close(guardians)
 
     asyncio.run(scene())
+
+
+def test_a_pty_behind_a_link_is_opened_without_the_frame_that_it_has_not(line: Pty, tmp_path: Path) -> None:
+    link = tmp_path / "regulator"
+    link.symlink_to(line.path)
+    for _ in range(2):  # once it was told of a parity it takes nothing more
+        os.close(open_descriptor(str(link), SerialSettings(baud=19200, parity="even")))
+        assert line.client_baud() == 19200
 
 
 @pytest.mark.parametrize("parity", ["none", "even", "odd"])

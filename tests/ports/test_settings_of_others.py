@@ -96,6 +96,28 @@ def test_a_speed_without_a_name_is_set_again_by_opening_anew(ear: Any, line: Pty
     assert told == []
 
 
+def test_a_driver_that_does_not_take_them_back_is_opened_anew(
+    ear: Any, line: Pty, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """tcsetattr succeeds where a part of it is taken: each look would tell that it is set again, and nothing would be."""
+    told = list[PortError]()
+
+    async def scene() -> None:
+        port = watched(ear, line.path, told)
+        await port.open()
+        other_speed(line)
+        with monkeypatch.context() as deaf:
+            deaf.setattr(termios, "tcsetattr", lambda *_: None)
+            port._look_at_settings()
+        assert [loss.code for loss in ear.losses] == ["E103"]
+        await ear.until(lambda: len(ear.opened) == 2)
+        assert line.client_baud() == 9600
+        port.close()
+
+    asyncio.run(scene())
+    assert told == []
+
+
 def test_a_port_that_is_gone_is_lost_by_its_hang_up_and_nothing_else(ear: Any, line: Pty) -> None:
     told = list[PortError]()
 

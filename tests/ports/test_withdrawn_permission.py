@@ -114,18 +114,21 @@ def failure(code: str) -> PortError:
     return refusal
 
 
-def test_a_refusal_is_told_anew_when_the_port_has_been_open_since(line: Pty) -> None:
+def test_a_refusal_is_told_anew_when_the_port_has_been_open_since(line: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
     refusals: asyncio.Queue[PortError] = asyncio.Queue()
+    told: list[Exception] = []  # at once: what a thread finds out of it comes later
 
     async def scene() -> None:
         nothing = lambda *_: None  # noqa: E731
         events = PortEvents(nothing, nothing, nothing, refusals.put_nowait)
         port = SerialPort(line.path, SerialSettings(baud=9600), events)
+        tell = port._tell_refusal
+        monkeypatch.setattr(port, "_tell_refusal", lambda path, error: (told.append(error), tell(path, error)))
         await port.open()
-        for _ in range(2):
+        for already in range(2):
             for code in ("E101", "E103", "E102", "E101", "E101"):
                 port._note_refusal(failure(code))
-            assert refusals.empty(), "not three in a row"
+            assert len(told) == already and refusals.empty(), "not three in a row"
             for _ in range(3):
                 port._note_refusal(failure("E101"))
             async with asyncio.timeout(5):

@@ -128,6 +128,14 @@ def test_a_damaged_header_is_refused_and_not_guessed(tmp_path: Path) -> None:
         read_recording(path)
 
 
+@pytest.mark.parametrize("length", [3, 12, 40])
+def test_a_recording_that_was_stopped_as_it_began_is_not_called_damaged(tmp_path: Path, length: int) -> None:
+    path = record(tmp_path, batches=1)
+    path.write_bytes(path.read_bytes()[:length])
+    with pytest.raises(RecordingError, match=f"ends inside its header, after {length} bytes"):
+        read_recording(path)
+
+
 @pytest.mark.parametrize(
     "document", [b"", b"[1]", b"nonsense", b'{"format":1}', b'{"format":1,"columns":[1]}', b"[" * 9000]
 )

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from gateway.recording import Recorder, read_recording
-from tests.recording.test_recorder import COLUMNS, HEADER
+from gateway.recording.care import keeping
+from tests.recording.test_recorder import COLUMNS, HEADER, record
 
 
 @contextmanager
@@ -96,3 +97,18 @@ def test_a_link_to_a_disk_that_is_not_mounted_is_no_file_that_exists(tmp_path: P
     (tmp_path / "not mounted").mkdir()
     Recorder(tmp_path / "recordings", HEADER, COLUMNS).close()
     assert [path.name for path in (tmp_path / "not mounted").iterdir()] == ["0001.fgr"]
+
+
+def test_on_a_full_disk_room_is_made_by_what_needs_no_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the highest number would be given again, and is marked before its recording goes."""
+    older, between, newest = (record(tmp_path / "recordings", 1) for _ in range(3))
+    between.unlink()
+
+    def full(*arguments: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(keeping, "replace_durably", full)
+    assert keeping.delete_recording(older, "") == "" and not older.exists()
+    with pytest.raises(OSError, match="No space"):
+        keeping.delete_recording(newest, "")
+    assert newest.exists()

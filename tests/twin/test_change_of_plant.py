@@ -9,8 +9,11 @@ import pytest
 from gateway.service.simulation.demonstration import DEMONSTRATIONS
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.socket_requests import SimulationRequest
-from gateway.twin import Plant, Surroundings, Twin
+from gateway.twin import Contact, LoadCell, Plant, Surroundings, Twin
+from gateway.twin.contact import ContactState
+from gateway.twin.load_cell import LoadCellState
 from gateway.twin.plant import with_value
+from gateway.twin.surroundings import TwinConditions
 from tests.service.rigs import demo
 
 AROUND = Surroundings(
@@ -153,3 +156,17 @@ def test_a_machine_that_has_worked_before_stands_still() -> None:
     before_n = twin.force_n
     twin.advance(0.1)
     assert twin.force_n == pytest.approx(before_n, abs=1e-3)
+
+
+def test_a_filter_and_a_play_begin_at_the_force_that_stands() -> None:
+    """One that began at 0 N would have pulled a reading of 10 N down, and a force by half of the play."""
+    cell = LoadCellState(LoadCell(), 0.001)
+    cell.step(10.0)
+    cell.change_cell(LoadCell(filter_s=0.05), begins=False)
+    cell.step(10.0)
+    assert cell.filtered_n == pytest.approx(10.0)
+    contact = ContactState(Contact(), 0.001, TwinConditions())
+    contact.change_contact(Contact(backlash_n=1.0, creep_share=0.1), 10.0)
+    assert contact.step(10.0) == pytest.approx(10.0, abs=1e-3), "nothing has crept yet"
+    assert contact.step(9.5) == pytest.approx(10.0, abs=1e-3)
+    assert contact.step(9.0) == pytest.approx(9.5, abs=1e-3)

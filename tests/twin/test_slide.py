@@ -5,6 +5,7 @@ import pytest
 
 from gateway.twin import Contact, Cylinder, Friction, Plant, Regulator, Twin
 from gateway.twin.experiment import Floats
+from gateway.twin.friction import age_stiction
 from tests.twin.traces import trace
 
 NEWTON_PER_VOLT = 9.0
@@ -161,3 +162,9 @@ def test_a_pad_above_the_workpiece_has_nothing_to_keep() -> None:
     twin = Twin(plant, 1)
     twin.press_and_vent()
     assert (twin.force_n, twin.position_m) == (0.0, 0.0)
+
+
+def test_a_motion_takes_away_what_its_own_step_has_rested_too() -> None:
+    assert age_stiction(0.0, 2.0, 1.0e9, 0.0) == (2.0, 2.0)
+    assert age_stiction(1.0, 2.0, 1.0e9, 1.0e3) == (1.0, 0.0)
+    assert age_stiction(1.0, 2.0, 0.0, 1.0) == (0.0, pytest.approx(np.exp(-1.0)))

@@ -2,15 +2,20 @@
 
 from math import hypot, isclose
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from gateway.diagnosis import Diagnosis
 from gateway.diagnosis.result import Cause, Estimate, Gain, Leftover
 from gateway.registers.residual_cause import ResidualCause
-from gateway.watch import machine_comparison, window_verdict
+from gateway.twin.plant import Friction, Plant
+from gateway.watch import machine_comparison, plant_comparison, window_verdict
 from gateway.watch.machine_comparison import MachineComparison
+from gateway.watch.plant_comparison import PlantComparison
+from gateway.watch.reference import WatchReference
+from gateway.watch.warning_filter import WindowVerdict
 from gateway.watch.window_verdict import PlantChange, describe_leftover, excess_of, judge_window, plausible_name
 
 LEFT_N, LEAST_N = 0.3, 0.1
@@ -122,3 +127,41 @@ def test_the_strongest_change_is_told_where_the_force_is_off_and_it_matters(
     verdict = judge_window(window, diagnosis, reference, LEAST_N)
     assert verdict.cause is cause
     assert verdict.excitation_v == 1.0
+
+
+def test_a_change_is_told_from_what_the_rigs_plant_says_to_what_the_window_shows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    change = PlantChange("coulomb-friction", (("friction", "coulomb_n", "N"),), ("coulomb-friction", "creep"), 0.85)
+    monkeypatch.setattr(window_verdict, "weigh_changes", lambda *_: [change])
+    monkeypatch.setattr(window_verdict, "excess_of", lambda *_: 0.9)
+    known, found = (SimpleNamespace(plant=Plant(friction=Friction(coulomb_n=value_n))) for value_n in (1.0, 2.4))
+    window: Any = SimpleNamespace(excitation_v=1.0)
+    diagnosis, reference = cast(Diagnosis, found), cast(WatchReference, known)
+    assert judge_window(window, diagnosis, reference, LEAST_N).sentence == (
+        "the force differs from the rig's plant by 0.85 N (rms): coulomb-friction, coulomb_n 1 -> 2.4 N; "
+        "this run cannot tell it from creep"
+    )
+
+
+def test_the_lines_are_taken_out_of_the_first_window_alone_and_only_a_well_one_is_usual(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Taken out of each, a machine that comes later day by day never would; and a change that was found once was usual."""
+    taken: list[str] = []
+    reference: Any = SimpleNamespace(
+        is_settled=False, plant=None, rms_n=lambda window: 1.0,
+        take_line_delays=lambda diagnosis: taken.append("lines"), raise_floor=lambda window, rms_n: taken.append("floor"),
+    )  # fmt: skip
+    comparison = PlantComparison(reference, lambda *_: cast(Diagnosis, None), LEAST_N)
+    window: Any = SimpleNamespace(measurement=None)
+    for settled, cause, expected in (
+        (False, ResidualCause.LEAK, ["lines"]),
+        (True, ResidualCause.LEAK, []),
+        (True, ResidualCause.UNKNOWN, []),
+        (True, ResidualCause.NONE, ["floor"]),
+    ):
+        reference.is_settled = settled
+        monkeypatch.setattr(plant_comparison, "judge_window", lambda *_, cause=cause: WindowVerdict(cause))
+        taken.clear()
+        assert comparison.judge(window).cause is cause and taken == expected

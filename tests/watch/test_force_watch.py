@@ -39,7 +39,10 @@ def looked(watch: ForceWatch, *parts: np.ndarray) -> str:
 def test_two_looks_in_a_row_make_a_warning_and_one_ends_it(watch: ForceWatch) -> None:
     worse, as_before = held(100.0, 60.0, 0.9), held(100.0, 60.0, 0.2)
     assert [looked(watch, rows) for rows in (worse, as_before, worse)] == ["", "", ""]
-    assert looked(watch, worse).startswith("since plant 3 is in use the force is 0.90 N (rms) off what is commanded")
+    assert looked(watch, worse).startswith(
+        "since plant 3 is in use the force is 0.90 N (rms) off what is commanded, with the rig's own plant it was 0.20 N "
+        "(0001.rec): 4.5 times, 95 % interval 4.5 .. 4.5; "
+    )
     assert looked(watch, held(200.0, 5.0, 0.2)) != "", "too few rows to compare say nothing"
     assert looked(watch, as_before) == ""
 

@@ -6,6 +6,7 @@ and effects that are switched on.
 
 import json
 import os
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 from types import SimpleNamespace
@@ -87,6 +88,8 @@ def test_a_described_machine_is_kept_and_read_again(tmp_path, monkeypatch):
     other = with_value(DEFAULT_PLANT, "friction", "coulomb_n", 7.0)
     room.described_machine(tmp_path, kept, other)
     assert made[2:] == [other], "what was described from another plant is another machine"
+    room.described_machine(tmp_path, replace(kept, sha256="0" * 64), other)
+    assert len(made) == 4, "and so is that of another recording of the same name"
 
 
 def named_after_s(effect: str, size: float, tmp_path: Path) -> tuple[float, ResidualCause, str]:

@@ -91,7 +91,9 @@ def _pulled_s(recording: Recording) -> float:
 
     if "time_s" not in recording.columns:
         return 0.0
-    return float(np.nansum(np.diff(recording.columns["time_s"])[pulled_rows(recording.columns)[:-1]]))
+    time_s = recording.columns["time_s"]
+    time_s = np.where(np.isfinite(time_s), time_s, np.nan)  # of another program: JSON has no infinity
+    return float(np.nansum(np.diff(time_s)[pulled_rows(recording.columns)[:-1]]))
 
 
 def _residual_n(recording: Recording) -> float | None:

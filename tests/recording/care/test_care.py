@@ -55,10 +55,10 @@ def test_a_summary_says_what_happened_by_name_and_number(tmp_path: Path) -> None
 def test_a_summary_says_how_long_the_tool_pulled(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "recordings", {}, ("time_s", *DERIVED, PULLING))
     for row in range(10):
-        recorder.append((row * 0.1, *(0.0 for _ in DERIVED), float(2 <= row < 7)))
+        recorder.append((row * row * 0.1, *(0.0 for _ in DERIVED), float(2 <= row < 7)))  # each until the next row
     recorder.close()
     (summary,) = list_summaries(tmp_path)
-    assert "pulled for 0.5 s" in summary["happened"] and summary["facts"]["pulled_s"] == 0.5
+    assert "pulled for 4.5 s" in summary["happened"] and summary["facts"]["pulled_s"] == 4.5
 
 
 def test_a_plan_is_named_and_faults_by_their_codes(tmp_path: Path) -> None:

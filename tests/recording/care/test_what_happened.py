@@ -1,6 +1,8 @@
 """What the list of recordings says of each."""
 
+import json
 import os
+from math import inf, nan
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from gateway.recording.calibrations_used import tell_changes
 from gateway.recording.care.keeping import choose_prunable
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.label import check_name, check_note
-from gateway.recording.tables.column_names import CALIBRATION, DERIVED
+from gateway.recording.tables.column_names import CALIBRATION, DERIVED, PULLING
 from gateway.registers.words import CalibrationPhase
 
 
@@ -97,3 +99,17 @@ def test_what_is_no_note_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="a note has 1 to 1000"):
         check_note(text)
     assert check_note("new seals,\n17 cells") == "new seals, 17 cells"
+
+
+@pytest.mark.parametrize("spoilt", [nan, inf, -inf])
+def test_what_a_list_says_of_another_programs_recording_is_json(tmp_path: Path, spoilt: float) -> None:
+    """A time, a force or a residual that is no number took the whole list from the page."""
+    columns = ("time_s", "force_n", *DERIVED, PULLING)
+    recorder = Recorder(tmp_path / "recordings", {}, columns)
+    for row in range(6):
+        others = (spoilt if row % 3 else 1.0 for _ in columns[2:])
+        recorder.append((spoilt if row % 2 else float(row), *others, 1.0))
+    recorder.close()
+    (summary,) = list_summaries(tmp_path)
+    assert summary["duration_s"] == 0.0 and summary["facts"]["force_range_n"] == [1.0, 1.0]
+    assert json.loads(json.dumps(list_summaries(tmp_path), allow_nan=False))[0]["rows"] == 6

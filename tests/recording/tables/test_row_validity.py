@@ -11,6 +11,7 @@ from gateway.recording import Recording, RecordingError
 from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
 from gateway.recording.tables.row_validity import Floats, flag_clipped, flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import check_time_axis
+from tests.recording.test_measurement_of import TIME_S, N, columns, measured
 
 
 def quality(*counts: tuple[float, int]) -> np.ndarray:
@@ -213,3 +214,12 @@ def test_readings_that_rest_at_the_largest_for_another_reason_are_kept(made_n: C
     force_n = made_n(held_readings(np.random.default_rng(4)))
     clipped, notes = flag_clipped(force_n, np.ones(force_n.size, dtype=bool))
     assert not clipped.any() and notes == []
+
+
+def test_what_a_column_of_quality_calls_good_may_still_be_no_witness() -> None:
+    """Of rows without a force, and of those behind a gap, a logger may say that all is well."""
+    gap_s = np.where(TIME_S >= 2.0, 0.2, 0.0)
+    force_n = columns()["force_n"]
+    force_n[7] = np.nan
+    found = measured(time_s=TIME_S + gap_s, force_n=force_n, quality=np.zeros(N))
+    assert np.flatnonzero(~found.usable).tolist() == [7, *range(400, 500)]

@@ -136,10 +136,22 @@ def test_each_number_of_the_answer_stands_under_its_own_name() -> None:
     assert (document["baseline"]["rms_n"], document["baseline"]["noise_floor_n"]) == (1.186, 0.12)
 
 
+def test_what_is_not_said_is_null_or_not_there() -> None:
+    """A column in another unit is swapped with none; what a foreign machine's numbers are says nothing of this plant."""
+    suspect = Suspect("E520", "a.csv", "force_n", 1000.0, unit="mn", option="--columns force_n=force_n:mn")
+    refit = Refit(1.4, 1.3, (RefittedNumber("friction", "coulomb_n", "N", 1.0, 3.0, 1.2),), is_own=False)
+    document = diagnosis_document(diagnosis(suspects=(suspect,), refit=refit), 1.5)
+    assert (document["suspects"][0]["swapped_with"], document["suspects"][0]["unit"]) == (None, "mn")
+    assert "refit" not in document and "machine" not in document
+
+
 def test_what_is_no_number_is_null() -> None:
     nan = float("nan")
     cause = replace(FRICTION, gain=Gain(1.0, 0.5, (nan, float("inf")), nan))
-    answer = diagnosis_document(diagnosis(causes=(cause,), extended=Extended(nan, False)), 1.0)
+    rest = Leftover("time_s", "hums", 0.4, ("time_s",), nan, None, float("inf"), "", "a rest")
+    answer = diagnosis_document(diagnosis(causes=(cause,), leftover=(rest,), extended=Extended(nan, False)), 1.0)
+    ((left,), names) = answer["leftover"], ("frequency_hz", "amplitude_n", "period_s", "file")
+    assert [left[name] for name in names] == [None] * 4
     assert answer["causes"][0]["gain"]["ci95"] == [None, None]
     assert answer["extended"]["held_out_rms_n"] is None
     jsonschema.validate(json.loads(json.dumps(answer, allow_nan=False)), CONTRACT)

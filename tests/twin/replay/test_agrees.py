@@ -51,6 +51,7 @@ EFFECTS: list[tuple[str, dict[str, float], float, str]] = [
     ("regulator", {"second_lag_s": 0.03}, 2.0e-3, GRID),
     ("regulator", {"ceiling_pa": 4.0e5}, TIGHT_N, ""),
     ("regulator", {"leak_flow_pa": 2.0e4}, TIGHT_N, ""),
+    ("regulator", {"ceiling_pa": 4.0e5, "leak_flow_pa": 2.0e4}, TIGHT_N, ""),  # the hole is behind the valve
     ("regulator", {"leak_per_s": 0.2}, 1.0e-3, GRID),
     ("regulator", {"droop_pa_per_pa": 0.1}, TIGHT_N, ""),
     ("regulator", {"droop_share_per_pa": 2.0e-6}, TIGHT_N, ""),

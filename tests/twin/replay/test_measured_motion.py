@@ -42,12 +42,13 @@ def test_asymmetry_load_and_speed_enter_by_their_own_terms() -> None:
             asymmetry_n=0.5,
             load_dependent_n_per_n=0.01,
             viscous_n_s_per_m=100.0,
+            asymmetry_n_s_per_m=40.0,
             stribeck_n=1.0,
             stribeck_speed_m_per_s=0.01,
         )
     )
     limit = 2.0 + 0.01 * 100.0 + 1.0 / (1.0 + (SPEED / 0.01) ** 2)
-    expected = 100.0 - 0.5 - limit * np.sign(SPEED) - 100.0 * SPEED
+    expected = 100.0 - 0.5 - limit * np.sign(SPEED) - np.where(SPEED > 0.0, 140.0, 60.0) * SPEED
     np.testing.assert_allclose(found[MOVING], expected[MOVING], atol=0.01)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.twin import Contact, Drive, Friction, LoadCell, Plant, Regulator, Replay
+from gateway.twin import Contact, Drive, Friction, LoadCell, Plant, Regulator, Replay, Surroundings
 from gateway.twin.experiment import Floats
 from gateway.twin.plant import with_value
 
@@ -193,3 +193,15 @@ def test_the_real_time_twin_loads_neither_replay_nor_scipy_nor_numba() -> None:
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "[]"
+
+
+def test_the_middle_of_a_path_is_that_of_its_rows_and_a_reading_sees_the_command_before_it() -> None:
+    """Rows that lie closer on one side have points of the grid between them: there, and at the rows, it is one middle."""
+    time_s = np.concatenate([np.arange(100) * 0.005, 0.5 + np.arange(1, 50) * 0.05])
+    position_mm = 20.0 * time_s
+    around = Surroundings(position_mm=position_mm)
+    grid = Replay(drive(time_s=time_s, command_v=command_at(time_s), surroundings=around, before_v=7.0)).grid
+    assert grid.points > grid.rows
+    assert grid.row_conditions.aside_mm == pytest.approx(position_mm - position_mm.mean())
+    assert grid.at_rows(grid.conditions.aside_mm) == pytest.approx(grid.row_conditions.aside_mm)
+    assert grid.row_conditions.command_v.tolist() == [7.0, *command_at(time_s)[:-1]]

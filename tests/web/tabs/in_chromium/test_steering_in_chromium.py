@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gateway.live.live_state import LiveForce, LiveLine, LiveLoop, LiveState
+from gateway.live.live_state import LiveForce, LiveLine, LiveLoop, LiveRecording, LiveState
 from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 from tests.web.tabs.scripted_control import ScriptedControl
 
@@ -122,6 +122,11 @@ def test_a_plan_of_ones_own_takes_numbers_as_they_are_typed_and_no_others(page, 
     go.click()
     window.locator("#tab-calibrate .told.bad").get_by_text("Stair (V): a number, such as 0.2.").wait_for()
     assert [plan["step_v"] for plan in asked] == [0.05]
+    stair.fill("0.1")
+    window.get_by_label("Take the force at rest as zero first").check()
+    with window.expect_response("**/api/v1/calibrate/preview"):
+        go.click()
+    assert [(plan["step_v"], plan.get("tare", False)) for plan in asked] == [(0.05, False), (0.1, True)]
     window.close()
 
 
@@ -187,3 +192,26 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
     assert told["columns"] == {"time_s": [1, 2, 3, 4], "force_n": [10, 20, 30, 40]}
     assert told["asked"] == ["setpoint", "enable"]
     browser.close()
+
+
+RECORD = """async (states) => {
+  const { makeSteering } = await import("/static/live/steering.js");
+  const asked = [];
+  const steering = makeSteering({ post: async (path, body) => asked.push([path, body]), say: () => {} });
+  for (const state of states) {
+    steering.state(state);
+    const words = state.recording.on ? "Stop recording" : "Record";
+    Array.from(steering.element.querySelectorAll("button")).find((one) => one.textContent === words).click();
+  }
+  return asked;
+}"""
+
+
+def test_the_button_of_a_recording_does_what_it_says(page, chromium) -> None:
+    """One that asked for a recording under way once more would never have ended it."""
+    base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off")
+    states = [base, replace(base, recording=LiveRecording(on=True, number=1))]
+    window: Any = open_tab(chromium, page.address, "wiring")
+    asked = window.evaluate(RECORD, [each.to_json() for each in states])
+    assert asked == [["/api/v1/command/record", {"on": True}], ["/api/v1/command/record", {"on": False}]]
+    window.close()

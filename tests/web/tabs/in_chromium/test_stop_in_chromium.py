@@ -46,3 +46,19 @@ def test_esc_stops_also_where_the_page_asks_again(page, served: ScriptedControl,
     window.get_by_text("it is in use").wait_for()
     assert asked == [{"use": number, "force": True}]
     browser.close()
+
+
+def test_what_was_not_rejected_is_never_asked_for_by_force(page, served: ScriptedControl, state, chromium) -> None:
+    """The gateway may know by then that its fit was rejected, and asks again: with force it would have obeyed."""
+    number = add_calibration(state)
+    asked: list[Any] = []
+    browser = chromium.new_context()
+    browser.route(
+        "**/api/v1/calibrations/change",
+        lambda route: (asked.append(json.loads(route.request.post_data)), route.fulfill(json={"said": "it is in use"})),
+    )
+    window = open_tab(browser, page.address, "calibrations")
+    window.get_by_role("button", name=f"Use calibration {number}").click()
+    window.get_by_text("it is in use").wait_for()
+    assert asked == [{"use": number}]
+    browser.close()
