@@ -55,7 +55,7 @@ class Switches:
 
     def end(self) -> None:
         """Do now what was not done yet."""
-        self.client.machine.switch = lambda _statement: None
+        self.client.machine.switch = None
         for act in self.at.values():
             act(self.client)
 

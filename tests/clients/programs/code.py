@@ -1,53 +1,48 @@
 """Makes Python functions of what tests/clients/programs/syntax/ has parsed, once for each place of a text: a program is run
 thousands of times, by many machines, and what a name or an operator is does not change between them.
 
-An expression becomes a function of machine and frame that returns its value, a statement one that returns nothing.
+A place is written as Python's own text, which is compiled: an expression becomes a function of machine and frame that returns
+its value, a list of statements one that returns None at its end, and what a RETURN gives in a tuple.
 """
 
-import operator
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
-from tests.clients.programs.kept import KEEPERS
 from tests.clients.programs.syntax.parser import Node
 
 if TYPE_CHECKING:
     from tests.clients.programs.machine import Frame, Machine
 
 Code = Callable[["Machine", "Frame"], Any]
-Keeper = Callable[["Machine", "Frame", Any, str], None]
-"""Assigns a value; the last argument is URScript's `local` or `global`, in capitals."""
 MOST_STEPS = 400_000
 """Statements of one call from outside: more is an endless loop."""
-OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": operator.truediv,
-    "DIV": lambda a, b: int(a) // int(b),
-    "MOD": lambda a, b: int(a) % int(b),
-    "AND": operator.and_,
-    "OR": operator.or_,
-    "XOR": operator.xor,
-    "=": operator.eq,
-    "==": operator.eq,
-    "<>": operator.ne,
-    "!=": operator.ne,
-    "<": operator.lt,
-    ">": operator.gt,
-    "<=": operator.le,
-    ">=": operator.ge,
+OPERATIONS = {
+    "/": "{} / {}",
+    "DIV": "int({}) // int({})",
+    "MOD": "int({}) % int({})",
+    "XOR": "{} ^ {}",
+    "=": "{} == {}",
+    "<>": "{} != {}",
+    **{word: f"{{}} {word} {{}}" for word in ("+", "-", "*", "==", "!=", "<", ">", "<=", ">=")},
 }
-made: dict[tuple[int, bool], tuple[Any, Any]] = {}
+STOPPING = {"AND": ("False", "&"), "OR": ("True", "|")}
+"""What of a left side ends it, and what is done with both else."""
+LOCALS = {
+    "v": "frame.variables",
+    "g": "machine.global_names",
+    "routine": "machine.called_alone.get",
+    "look_up": "machine.look_up",
+    "place": "machine.place",
+    "member_of": "machine.member_of",
+    "keep": "machine.keep_variable",
+    "call": "machine.call_routine",
+}
+"""Names that a function's text uses, if it does, and what they are."""
+made: dict[tuple[int, bool, str], tuple[Any, Any]] = {}
 """What each place has become, by its identity, which stays: the place is kept beside it."""
-keepers: dict[tuple[int, bool], tuple[Node, Keeper]] = {}
-
-
-class Returned(Exception):  # noqa: N818
-    def __init__(self, value: Any) -> None:
-        self.value = value
 
 
 class RapidError(Exception):
@@ -64,305 +59,224 @@ def key_of(name: str, fold: bool) -> str:
     return folded(name) if fold else name
 
 
-def code_of(place: Any, fold: bool) -> Any:
-    """Return the function of an expression, or that of a list of statements."""
-    known = made.get((id(place), fold))
+def code_of(place: Any, fold: bool, use: str = "") -> Any:
+    """Return the function of an expression, or that of a list of statements. use: "watched" for one that calls machine.switch
+    wherever another task may run, "assigned" for one that gives a third argument to the place, "given" for one that returns
+    a call's arguments in their order."""
+    known = made.get((id(place), fold, use))
     if known is None:
-        maker = body_code if isinstance(place, list) else VALUES[place[0]]
-        known = made[id(place), fold] = place, maker(place, fold)
+        known = made[id(place), fold, use] = place, Writer(fold, use).code(place)
     return known[1]
 
 
-# -- expressions
+def invert(value: Any) -> Any:
+    return not value if isinstance(value, bool) else ~value
 
 
-def constant_code(node: Node, fold: bool) -> Code:
-    constant = node[1]
-    return lambda _machine, _frame: constant
+def endless() -> None:
+    raise RecursionError("an endless loop")
 
 
-def name_code(node: Node, fold: bool) -> Code:
-    key = key_of(node[1], fold)
-
-    def name(machine: "Machine", frame: "Frame") -> Any:
-        variables = frame.variables
-        return variables[key] if key in variables else machine.look_up(key, node)
-
-    return name
+def no_truth(condition: Node) -> None:
+    raise AssertionError(condition)
 
 
-def binary_code(node: Node, fold: bool) -> Code:
-    act, left, right = OPERATIONS[node[1]], code_of(node[2], fold), code_of(node[3], fold)
-    if node[1] not in ("AND", "OR"):
-        return lambda machine, frame: act(left(machine, frame), right(machine, frame))
-    goes_on = node[1] == "AND"
+class Writer:
+    """Writes one function."""
 
-    def short(machine: "Machine", frame: "Frame") -> Any:
-        first = left(machine, frame)
-        if first is True or first is False:
-            return right(machine, frame) if first is goes_on else first
-        return act(first, right(machine, frame))
+    def __init__(self, fold: bool, use: str) -> None:
+        self.fold, self.use = fold, use
+        self.lines: list[str] = []
+        self.depth = 1
+        self.numbers = count()
+        self.names: dict[str, Any] = {
+            "invert": invert,
+            "endless": endless,
+            "no_truth": no_truth,
+            "RapidError": RapidError,
+        }
+        self.used: set[str] = set()
 
-    return short
-
-
-def list_code(node: Node, fold: bool) -> Code:
-    items = [code_of(each, fold) for each in node[1]]
-    return lambda machine, frame: [item(machine, frame) for item in items]
-
-
-def index_code(node: Node, fold: bool) -> Code:
-    holder, index = code_of(node[1], fold), code_of(node[2][0], fold)
-    return lambda machine, frame: holder(machine, frame)[machine.place(index(machine, frame))]
-
-
-def field_code(node: Node, fold: bool) -> Code:
-    holder, name = code_of(node[1], fold), node[2]
-    return lambda machine, frame: machine.member(holder(machine, frame), name)
-
-
-def bit_code(node: Node, fold: bool) -> Code:
-    word, number = code_of(node[1], fold), node[3]
-    if node[2] == "X":
-        return lambda machine, frame: bool(word(machine, frame) >> number & 1)
-    return lambda machine, frame: word(machine, frame) >> 16 * number & 0xFFFF
-
-
-def unary_code(node: Node, fold: bool) -> Code:
-    inside = code_of(node[2], fold)
-    if node[1] == "-":
-        return lambda machine, frame: -inside(machine, frame)
-
-    def invert(machine: "Machine", frame: "Frame") -> Any:
-        value = inside(machine, frame)
-        return not value if isinstance(value, bool) else ~value
-
-    return invert
-
-
-@dataclass(frozen=True)
-class Given:
-    """Arguments of a call, in their order or by name."""
-
-    positional: list[Code]
-    named: dict[str, Code] = field(default_factory=dict)
-
-    @property
-    def count(self) -> int:
-        return len(self.positional) + len(self.named)
-
-
-def call_code(node: Node, fold: bool) -> Code:
-    """A routine of the program, an instance of a block, or what the controller brings along."""
-    target, arguments = node[1], node[2]
-    named = {each[1]: code_of(each[2], fold) for each in arguments if each[0] == "named"}
-    if target[0] != "name":
-        holder = code_of(target, fold)
-        return lambda machine, frame: holder(machine, frame).call(values_of(named, machine, frame))
-    key = key_of(target[1], fold)
-    given = Given(
-        [code_of(each, fold) for each in arguments if each[0] != "named"],
-        {key_of(name, fold): code for name, code in named.items()},
-    )
-
-    def call(machine: "Machine", frame: "Frame") -> Any:
-        routine = machine.routines.get(key)
-        if routine is None or routine.kind == "FUNCTION_BLOCK":
-            instance = frame.variables.get(key, machine.global_names.get(key))
-            if hasattr(instance, "call"):
-                return instance.call(values_of(named, machine, frame))
-        if routine is not None:
-            return machine.call_routine(routine, given, frame)
-        if key in machine.library:
-            return machine.library[key](machine, arguments, frame)
-        raise NameError(f"{target[1]} is neither a routine nor known to the controller")
-
-    return call
-
-
-def values_of(named: dict[str, Code], machine: "Machine", frame: "Frame") -> dict[str, Any]:
-    return {name: code(machine, frame) for name, code in named.items()}
-
-
-# -- statements
-
-
-def body_code(body: list[Node], fold: bool) -> Code:
-    steps = [(statement, STATEMENTS[statement[0]](statement, fold)) for statement in body]
-
-    def run(machine: "Machine", frame: "Frame") -> None:
-        for statement, code in steps:
-            machine.steps += 1
-            if machine.steps > MOST_STEPS:
-                raise RecursionError("an endless loop")
-            if machine.switch is not None and not machine.is_critical:
-                machine.switch(statement)
-            code(machine, frame)
-
-    return run
-
-
-def block_code(node: Node, fold: bool) -> Code:
-    return code_of(node[1], fold)
-
-
-def critical_code(node: Node, fold: bool) -> Code:
-    """URScript: no other thread runs in here."""
-
-    def begin_or_end(machine: "Machine", _frame: "Frame") -> None:
-        machine.is_critical = node[1]
-
-    return begin_or_end
-
-
-def keeper_code(target: Node, fold: bool) -> Keeper:
-    """Return the function that assigns to a place."""
-    known = keepers.get((id(target), fold))
-    if known is None:
-        known = keepers[id(target), fold] = target, TARGETS[target[0]](target, fold)
-    return known[1]
-
-
-def variable_keeper(target: Node, fold: bool) -> Keeper:
-    key = key_of(target[1], fold)
-    return lambda machine, frame, value, scope: machine.keep_variable(key, target, value, frame, scope)
-
-
-def item_keeper(target: Node, fold: bool) -> Keeper:
-    holder, index = code_of(target[1], fold), code_of(target[2][0], fold)
-
-    def keep(machine: "Machine", frame: "Frame", value: Any, _scope: str) -> None:
-        items, place = holder(machine, frame), machine.place(index(machine, frame))
-        if machine.is_typed:
-            machine.keep_type(str(target[1]), items[place], value)
-        items[place] = machine.store(KEEPERS["WORD"] if machine.has_words and type(value) is int else None, value)
-
-    return keep
-
-
-def field_keeper(target: Node, fold: bool) -> Keeper:
-    holder, key = code_of(target[1], fold), key_of(target[2], fold)
-
-    def keep(machine: "Machine", frame: "Frame", value: Any, _scope: str) -> None:
-        members = holder(machine, frame)
-        if not isinstance(members, dict):  # a static of a block of the controller's own
-            members.set_static(target[2], value)
+    def code(self, place: Any) -> Code:
+        if self.use == "assigned":
+            self.keep(place, "value", "''")
+        elif self.use == "given":
+            plain = (each[2] if each[0] == "named" else each for each in place)
+            self.line(f"return [{', '.join(map(self.value, plain))}]")
+        elif isinstance(place, list):
+            self.body(place)
         else:
-            members[target[2] if machine.is_union(members) else key] = machine.store(None, value)
+            self.line(f"return {self.value(place)}")
+        first = [f"    {name} = {LOCALS[name]}" for name in LOCALS if name in self.used]
+        text = "\n".join(["def code(machine, frame, value=None):", *first, *self.lines])
+        exec(compile(text, "<program>", "exec"), self.names)
+        return self.names["code"]  # type: ignore[no-any-return]
 
-    return keep
+    def line(self, text: str) -> None:
+        self.lines.append("    " * self.depth + text)
 
+    @contextmanager
+    def below(self, text: str) -> Iterator[None]:
+        """Write this line, and the block's lines under it."""
+        self.line(text)
+        self.depth += 1
+        yield
+        self.depth -= 1
 
-def assign_code(node: Node, fold: bool) -> Code:
-    value, keep, scope = code_of(node[2], fold), keeper_code(node[1], fold), node[3] if len(node) > 3 else ""
+    def local(self, name: str) -> str:
+        self.used.add(name)
+        return name
 
-    def assign(machine: "Machine", frame: "Frame") -> None:
-        found = value(machine, frame)
-        if machine.is_sliced and machine.switch is not None and not machine.is_critical:
-            machine.switch(node)
-        keep(machine, frame, found, scope)
+    def new(self) -> str:
+        return f"t{next(self.numbers)}"
 
-    return assign
+    def kept(self, thing: Any) -> str:
+        """Return the name by which the text reaches a thing."""
+        name = f"n{next(self.numbers)}"
+        self.names[name] = thing
+        return name
 
+    def key(self, name: str) -> str:
+        return repr(key_of(name, self.fold))
 
-def if_code(node: Node, fold: bool) -> Code:
-    branches = [(code_of(condition, fold), code_of(body, fold), condition) for condition, body in node[1]]
-    otherwise = code_of(node[2], fold)
+    # -- expressions
 
-    def choose(machine: "Machine", frame: "Frame") -> None:
-        for decide, body, condition in branches:
-            decided = decide(machine, frame)
-            assert decided is True or decided is False, condition
-            if decided:
-                body(machine, frame)
-                return
-        otherwise(machine, frame)
+    def value(self, node: Node) -> str:
+        return str(getattr(self, f"{node[0]}_value")(node))
 
-    return choose
+    def value_value(self, node: Node) -> str:
+        return f"({node[1]!r})" if isinstance(node[1], (bool, int, float, str)) else self.kept(node[1])
 
+    def name_value(self, node: Node) -> str:
+        key, own, common = self.key(node[1]), self.local("v"), self.local("g")
+        other = f"{self.local('look_up')}({key}, {self.kept(node)})"
+        return f"({own}[{key}] if {key} in {own} else {common}[{key}] if {key} in {common} else {other})"
 
-def case_code(node: Node, fold: bool) -> Code:
-    value, otherwise = code_of(node[1], fold), code_of(node[3], fold)
-    branches = [([code_of(label, fold) for label in labels], code_of(body, fold)) for labels, body in node[2]]
+    def binary_value(self, node: Node) -> str:
+        left, right = self.value(node[2]), self.value(node[3])
+        if node[1] not in STOPPING:
+            return f"({OPERATIONS[node[1]].format(left, right)})"
+        first, (end, act) = self.new(), STOPPING[node[1]]
+        return f"({first} if ({first} := {left}) is {end} else {first} {act} {right})"
 
-    def choose(machine: "Machine", frame: "Frame") -> None:
-        found = value(machine, frame)
-        for labels, body in branches:
-            if any(label(machine, frame) == found for label in labels):
-                body(machine, frame)
-                return
-        otherwise(machine, frame)
+    def list_value(self, node: Node) -> str:
+        return f"[{', '.join(map(self.value, node[1]))}]"
 
-    return choose
+    def index_value(self, node: Node) -> str:
+        return f"{self.value(node[1])}[{self.local('place')}({self.value(node[2][0])})]"
 
+    def field_value(self, node: Node) -> str:
+        return f"{self.local('member_of')}({self.value(node[1])}, {node[2]!r}, {self.key(node[2])})"
 
-def for_code(node: Node, fold: bool) -> Code:
-    first, last, body = (code_of(each, fold) for each in node[2:5])
-    keep, key = keeper_code(node[1], fold), key_of(node[1][1], fold)
+    def bit_value(self, node: Node) -> str:
+        word, number = self.value(node[1]), node[3]
+        return f"bool({word} >> {number} & 1)" if node[2] == "X" else f"({word} >> {16 * number} & 0xFFFF)"
 
-    def repeat(machine: "Machine", frame: "Frame") -> None:
-        begin, end = int(first(machine, frame)), int(last(machine, frame))
-        implicit = machine.library.get("implicit_for")
-        for k in range(begin, end + 1):
-            keep(machine, frame, k, "LOCAL" if implicit else "")
-            body(machine, frame)
-        if implicit:
-            frame.variables.pop(key, None)
+    def unary_value(self, node: Node) -> str:
+        inside = self.value(node[2])
+        return f"(-{inside})" if node[1] == "-" else f"invert({inside})"
 
-    return repeat
+    def call_value(self, node: Node) -> str:
+        """A routine of the program, an instance of a block, or what the controller brings along."""
+        target, arguments = node[1], node[2]
+        plain = [self.value(each) for each in arguments if each[0] != "named"]
+        named = [(each[1], self.value(each[2])) for each in arguments if each[0] == "named"]
+        words = f"{{{', '.join(f'{name!r}: {value}' for name, value in named)}}}"
+        if target[0] != "name":
+            return f"{self.value(target)}.call({words})"
+        key, known = self.key(target[1]), self.new()
+        folded_words = f"{{{', '.join(f'{self.key(name)}: {value}' for name, value in named)}}}"
+        given = folded_words if named else f"[{', '.join(plain)}]"
+        text = f"{self.local('call')}({known}, {given}) if ({known} := {self.local('routine')}({key})) else "
+        if not plain:
+            text += f"{known}.call({words}) if ({known} := machine.instance({key}, {self.local('v')})) else "
+        return f"({text}machine.use({key}, {self.kept(arguments)}, frame))"
 
+    # -- statements
 
-def while_code(node: Node, fold: bool) -> Code:
-    condition, body = code_of(node[1], fold), code_of(node[2], fold)
+    def body(self, body: list[Node]) -> None:
+        if not body:
+            self.line("pass")
+            return
+        self.line(f"machine.steps += {len(body)}")
+        with self.below(f"if machine.steps > {MOST_STEPS}:"):
+            self.line("endless()")
+        for statement in body:
+            self.may_switch(statement)
+            getattr(self, f"write_{statement[0]}")(statement)
 
-    def repeat(machine: "Machine", frame: "Frame") -> None:
-        while condition(machine, frame):
-            body(machine, frame)
+    def may_switch(self, node: Node, condition: str = "") -> None:
+        if self.use == "watched":
+            with self.below(f"if {condition}not machine.is_critical:"):
+                self.line(f"machine.switch({self.kept(node)})")
 
-    return repeat
+    def write_call(self, node: Node) -> None:
+        self.line(self.value(node))
 
+    def write_block(self, node: Node) -> None:
+        self.body(node[1])
 
-def return_code(node: Node, fold: bool) -> Code:
-    value = constant_code(("value", None), fold) if node[1] is None else code_of(node[1], fold)
+    def write_critical(self, node: Node) -> None:
+        """URScript: no other thread runs in here."""
+        self.line(f"machine.is_critical = {node[1]}")
 
-    def end(machine: "Machine", frame: "Frame") -> None:
-        raise Returned(value(machine, frame))
+    def write_assign(self, node: Node) -> None:
+        found, scope = self.new(), node[3] if len(node) > 3 else ""
+        self.line(f"{found} = {self.value(node[2])}")
+        self.may_switch(node, "machine.is_sliced and ")
+        self.keep(node[1], found, repr(scope))
 
-    return end
+    def keep(self, target: Node, value: str, scope: str) -> None:
+        """Assign to a place. scope: the text of URScript's `local` or `global`, in capitals."""
+        if target[0] == "name":
+            key = self.key(target[1])
+            self.line(f"{self.local('keep')}({key}, {self.kept(target)}, {value}, frame, {scope})")
+        elif target[0] == "index":
+            index = f"{self.local('place')}({self.value(target[2][0])})"
+            self.line(f"machine.keep_item({self.value(target[1])}, {index}, {value}, {self.kept(target)})")
+        else:
+            holder, name = self.value(target[1]), target[2]
+            self.line(f"machine.keep_field({holder}, {name!r}, {self.key(name)}, {value})")
 
+    def write_if(self, node: Node) -> None:
+        word = "if"
+        for condition, body in node[1]:
+            decided = self.new()
+            with self.below(f"{word} ({decided} := {self.value(condition)}) is True:"):
+                self.body(body)
+            is_wrong = f"({decided} is not False and no_truth({self.kept(condition)}))"
+            word = f"elif {is_wrong} or"
+        with self.below("else:"):
+            self.line(is_wrong)
+            self.body(node[2])
 
-def raise_code(node: Node, fold: bool) -> Code:
-    def end(_machine: "Machine", _frame: "Frame") -> None:
-        raise RapidError(node[1][1])
+    def write_case(self, node: Node) -> None:
+        found = self.new()
+        self.line(f"{found} = {self.value(node[1])}")
+        word = "if"
+        for labels, body in node[2]:
+            is_one = " or ".join(f"{self.value(label)} == {found}" for label in labels)
+            with self.below(f"{word} {is_one}:"):
+                self.body(body)
+            word = "elif"
+        with self.below("else:"):
+            self.body(node[3])
 
-    return end
+    def write_for(self, node: Node) -> None:
+        number, implicit = self.new(), self.new()
+        self.line(f"{implicit} = machine.library.get('implicit_for')")
+        with self.below(f"for {number} in range(int({self.value(node[2])}), int({self.value(node[3])}) + 1):"):
+            self.keep(node[1], number, f"'LOCAL' if {implicit} else ''")
+            self.body(node[4])
+        with self.below(f"if {implicit}:"):
+            self.line(f"{self.local('v')}.pop({self.key(node[1][1])}, None)")
 
+    def write_while(self, node: Node) -> None:
+        with self.below(f"while {self.value(node[1])}:"):
+            self.body(node[2])
 
-VALUES: dict[str, Callable[[Node, bool], Code]] = {
-    "value": constant_code,
-    "name": name_code,
-    "binary": binary_code,
-    "list": list_code,
-    "index": index_code,
-    "field": field_code,
-    "bit": bit_code,
-    "unary": unary_code,
-    "call": call_code,
-}
-STATEMENTS: dict[str, Callable[[Node, bool], Code]] = {
-    "block": block_code,
-    "critical": critical_code,
-    "assign": assign_code,
-    "if": if_code,
-    "case": case_code,
-    "for": for_code,
-    "while": while_code,
-    "return": return_code,
-    "raise": raise_code,
-    "call": call_code,
-}
-TARGETS: dict[str, Callable[[Node, bool], Keeper]] = {
-    "name": variable_keeper,
-    "index": item_keeper,
-    "field": field_keeper,
-}
+    def write_return(self, node: Node) -> None:
+        self.line(f"return ({'None' if node[1] is None else self.value(node[1])},)")
+
+    def write_raise(self, node: Node) -> None:
+        self.line(f"raise RapidError({node[1][1]!r})")

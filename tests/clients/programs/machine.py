@@ -10,7 +10,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from tests.clients.programs.code import Given, RapidError, Returned, code_of, constant_code, keeper_code, key_of
+from tests.clients.programs.code import RapidError, code_of, key_of
 from tests.clients.programs.kept import FIRST_VALUES, KEEPERS, Keeps
 from tests.clients.programs.syntax.parser import Node, Routine, Unit
 
@@ -52,6 +52,8 @@ class Union(dict[str, Any]):
 class Frame:
     """One call: its variables, and what each of them keeps of a value."""
 
+    __slots__ = ("constants", "keepers", "variables")
+
     def __init__(self, variables: dict[str, Any], declared: "Declared | None" = None) -> None:
         self.variables = variables
         self.keepers = declared.keepers if declared else {}
@@ -68,8 +70,9 @@ class Declared:
         self.parameters = [(key(name), machine.keeper_of(kind)) for name, kind, _ in routine.parameters]
         given = {name for name, _ in self.parameters}
         local = [(key(name), kind, initial) for name, (kind, initial, _) in entries if key(name) not in given]
-        if routine.kind == "FUNCTION":
-            local.append((key(routine.name), routine.result, None))
+        self.result = key(routine.name) if routine.kind == "FUNCTION" else None
+        if self.result:
+            local.append((self.result, routine.result, None))
         self.made = [each for each in local if each[2] is not None or not machine.is_plain(each[1])]
         self.plain = {
             name: machine.fresh(kind) for name, kind, initial in local if initial is None and machine.is_plain(kind)
@@ -82,7 +85,10 @@ class Machine:
     def __init__(self, unit: Unit, library: dict[str, Callable[..., Any]], *, fold: bool = True) -> None:
         self.unit, self.library, self.fold = unit, library, fold
         self.routines = {self.key(name): routine for name, routine in unit.routines.items()}
+        self.called_alone = {key: each for key, each in self.routines.items() if each.kind != "FUNCTION_BLOCK"}
+        """Others are called by an instance of theirs."""
         self.declared = {self.key(name): entry for name, entry in unit.variables.items()}
+        self.global_keepers = {name: self.keeper_of(kind) for name, (kind, _, _) in self.declared.items()}
         self.types = {self.key(name): members for name, members in unit.types.items()}
         self.global_names: dict[str, Any] = {}
         self.blocks: dict[str, Callable[[], Any]] = {}
@@ -94,7 +100,7 @@ class Machine:
         self.steps = 0
         self.is_critical = False
         self.switch: Callable[[Node], object] | None = None
-        """Called wherever another task or thread may run, with the statement that comes next."""
+        """Called wherever another task or thread may run, with the statement that comes next; set between calls."""
         self.called: set[str] = set()
 
     def key(self, name: str) -> str:
@@ -158,32 +164,40 @@ class Machine:
     def value(self, node: Node, frame: Frame) -> Any:
         return code_of(node, self.fold)(self, frame)
 
+    def values(self, arguments: list[Node], frame: Frame) -> list[Any]:
+        """Return a call's arguments in their order, the named ones too."""
+        return code_of(arguments, self.fold, "given")(self, frame)  # type: ignore[no-any-return]
+
     def place(self, index: Any) -> int:
+        if type(index) is int and index >= self.first_index:
+            return index - self.first_index
         if index != int(index) or index < self.first_index:
             raise IndexError(f"index {index}")
         return int(index) - self.first_index
 
     def member(self, holder: Any, name: str) -> Any:
+        return self.member_of(holder, name, self.key(name))
+
+    @staticmethod
+    def member_of(holder: Any, name: str, key: str) -> Any:
+        """key: the name as the language compares it."""
+        if type(holder) is dict:
+            return holder[key]
         if isinstance(holder, Union):
             return holder[name]
-        if isinstance(holder, dict):
-            return holder[self.key(name)]
-        if isinstance(holder, Block):
-            return holder.fields[self.key(name)]
-        return getattr(holder, name)
+        return holder.fields[key] if isinstance(holder, Block) else getattr(holder, name)
 
     def look_up(self, name: str, node: Node) -> Any:
-        """Return what is no variable of the routine: of the module, or known to the controller."""
-        if name in self.global_names:
-            return self.global_names[name]
+        """Return what no variable of the routine or of the module is, but known to the controller."""
         if name in self.library and not callable(self.library[name]):
             return self.library[name]
         raise NameError(f"line {node[2]}: {node[1]} is not declared")
 
     # -- statements
 
-    def assign(self, target: Node, value: Any, frame: Frame, scope: str = "") -> None:
-        keeper_code(target, self.fold)(self, frame, value, scope)
+    def assign(self, target: Node, value: Any, frame: Frame) -> None:
+        """Assign to a place that a routine of the controller was given."""
+        code_of(target, self.fold, "assigned")(self, frame, value)
 
     def keep_variable(self, name: str, node: Node, value: Any, frame: Frame, scope: str) -> None:
         """Assign to a variable. name: as the language compares it."""
@@ -201,13 +215,21 @@ class Machine:
             declared = self.declared.get(name)
             if declared and declared[2] == "CONST":
                 raise TypeError(f"{node[1]} is a constant")
-            self.global_names[name] = self.store(self.keeper_of(declared[0]) if declared else None, value)
+            self.global_names[name] = self.store(self.global_keepers.get(name), value)
         else:
             raise NameError(f"line {node[2]}: {node[1]} is not declared")
 
-    @staticmethod
-    def is_union(members: dict[str, Any]) -> bool:
-        return isinstance(members, Union)
+    def keep_item(self, items: Any, place: int, value: Any, target: Node) -> None:
+        if self.is_typed:
+            self.keep_type(str(target[1]), items[place], value)
+        items[place] = self.store(KEEPERS["WORD"] if self.has_words and type(value) is int else None, value)
+
+    def keep_field(self, members: Any, name: str, key: str, value: Any) -> None:
+        """key: the name as the language compares it."""
+        if not isinstance(members, dict):  # a static of a block of the controller's own
+            members.set_static(name, value)
+        else:
+            members[name if isinstance(members, Union) else key] = self.store(None, value)
 
     def keep_type(self, name: str, before: Any, value: Any) -> None:
         """URScript: "The type of a variable is deduced from the first assignment of the variable" (script manual, 1.3)."""
@@ -216,42 +238,48 @@ class Machine:
 
     # -- calls
 
-    def call_routine(self, routine: Routine, given: Given, frame: Frame) -> Any:
-        if given.count != len(routine.parameters):
-            raise TypeError(f"{routine.name}: {given.count} arguments, {len(routine.parameters)} are wanted")
+    def instance(self, key: str, variables: dict[str, Any]) -> Any:
+        """Return a block that is called by its variable's name, else None."""
+        found = variables.get(key, self.global_names.get(key))
+        return found if hasattr(found, "call") else None
+
+    def use(self, key: str, arguments: list[Node], frame: Frame) -> Any:
+        """Call what the controller brings along."""
+        if key not in self.library:
+            raise NameError(f"{key} is neither a routine nor known to the controller")
+        return self.library[key](self, arguments, frame)
+
+    def call_routine(self, routine: Routine, given: Any) -> Any:
+        """given: arguments in their order, or by name."""
+        if len(given) != len(routine.parameters):
+            raise TypeError(f"{routine.name}: {len(given)} arguments, {len(routine.parameters)} are wanted")
         declared = self.declared_by(routine)
         variables = dict(declared.plain)
         for k, (name, keep) in enumerate(declared.parameters):
-            code = given.named[name] if given.named else given.positional[k]
-            variables[name] = self.store(keep, code(self, frame))
+            variables[name] = self.store(keep, given[name] if type(given) is dict else given[k])
         for name, kind, initial in declared.made:
             variables[name] = self.fresh(kind, initial)
-        inner = Frame(variables, declared)
-        try:
-            self.run_body(routine, inner)
-        except Returned as result:
-            return result.value
-        return variables.get(self.key(routine.name)) if routine.kind == "FUNCTION" else None
+        returned = self.run_body(routine, Frame(variables, declared))
+        if returned:
+            return returned[0]
+        return variables.get(declared.result) if declared.result else None
 
-    def run_body(self, routine: Routine, frame: Frame) -> None:
+    def run_body(self, routine: Routine, frame: Frame) -> tuple[Any] | None:
+        """Return what a RETURN has given, None at the body's end."""
         self.called.add(routine.name)
+        use = "" if self.switch is None else "watched"
         try:
-            code_of(routine.body, self.fold)(self, frame)
+            return code_of(routine.body, self.fold, use)(self, frame)  # type: ignore[no-any-return]
         except RapidError as error:
             if not routine.handler:
                 raise
             self.global_names["ERRNO"] = str(error)
             try:
-                code_of(routine.handler, self.fold)(self, frame)
+                return code_of(routine.handler, self.fold, use)(self, frame)  # type: ignore[no-any-return]
             except RapidError as second:
                 raise TaskStopped(f"{second} in the ERROR handler of {routine.name}") from None
-        except Returned:
-            if routine.kind == "FUNCTION_BLOCK":
-                return
-            raise
 
     def start(self, name: str, *arguments: Any) -> Any:
         """Call a routine from outside."""
         self.steps = 0
-        given = Given([constant_code(("value", each), self.fold) for each in arguments])
-        return self.call_routine(self.routines[self.key(name)], given, Frame({}))
+        return self.call_routine(self.routines[self.key(name)], arguments)

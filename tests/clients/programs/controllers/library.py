@@ -11,7 +11,7 @@ def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], An
     """Return a library routine that gets its arguments' values in their order."""
 
     def call(machine: Machine, arguments: list[Node], frame: Frame) -> Any:
-        return act(*(machine.value(each[2] if each[0] == "named" else each, frame) for each in arguments))
+        return act(*machine.values(arguments, frame))
 
     return call
 
