@@ -155,11 +155,10 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         ending.callback(listeners.close)
         running.ring = sample_ring(options["ring"], log)
         guardian.on_ports = running.move_ports
+        kept = options["kept"] or left_of(CleanShutdownMarker(Path(options["state"])).left)
         ready = await running.start(
             options["bind"],
-            Handover(
-                options["kept"] or left_of(CleanShutdownMarker(Path(options["state"])).left), record=options["record"]
-            ),
+            Handover(kept, record=options["record"]),
             restarted=Ending.from_json(options["restarted"]),
         )
         ready = replace(ready, notes=ready.notes + notes, http=listeners.addresses)
