@@ -234,6 +234,8 @@ class Admission:
             return
         if refused.reason is RefusalReason.FAULT_LATCHED and refused.bit & ENABLE:
             self.held_enables.note(write.host, command.received_s)
+        if refused.reason is RefusalReason.HEARTBEAT_STALE and HEARTBEAT in self._offsets(write):
+            self.held_enables.note_lost(write.host, command.heartbeat)
         if not refused.bit:
             raise Refusal(refused.reason, write.address, refused.text)
         offsets = self._offsets(write)
