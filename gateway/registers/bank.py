@@ -46,6 +46,7 @@ from gateway.registers.writes.command_block import (
 )
 from gateway.registers.writes.ownership import LastWriters, Ownership
 from gateway.registers.writes.proposed_write import Decide
+from gateway.registers.writes.repeated_write import RepeatedWrite
 
 
 class RegisterBank:
@@ -73,17 +74,16 @@ class RegisterBank:
         self._status = StatusBlock(register_map, self._image)
         self.show_watchdogs = self._status.show_watchdogs
         self._tell_status: Callable[[], Status] | None = None
-        self.self_test = SelfTestWords(register_map, self._image)
+        self.self_test, self._bit_words = SelfTestWords(register_map, self._image), BitWords(register_map)
         self._ownership, self._owner_peer = Ownership(rules.owner), NOBODY
         self.owner_refused, self.owner_refused_s = "", float("-inf")  # why the last was, empty: taken; when one was
         self._echo = ByteOrderEcho(register_map.find("byte_order_echo"), self._image)
         self._admission = Admission(self._commands, self._ownership, self._echo, rules)
-        self._repeated = self._admission.repeated
+        self._repeated = RepeatedWrite(self._admission, self._commands, self._ownership)
         self.held_runs, self.held_enables = self._admission.held_runs, self._admission.held_enables
         self.staging = StagingBlock(register_map, self._image)
         self._image.put(register_map.find("map_version"), register_map.version)
         self._image.put(register_map.find("map_hash"), register_map.map_hash)
-        self._bit_words = BitWords(register_map)
         self._show_owner()
         self.publish(Status())
 

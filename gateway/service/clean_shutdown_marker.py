@@ -31,7 +31,7 @@ class CleanShutdownMarker:
 
     @property
     def left(self) -> dict[str, Any]:
-        """Return what the last run that ended cleanly has left; empty where that is nothing, or no object."""
+        """Facts that the last run that ended cleanly has left; empty where there are none, or no object."""
         try:
             return read_object(self._left)
         except (OSError, ValueError):

@@ -156,11 +156,8 @@ async def run(rig: Rig, options: dict[str, Any], link: socket.socket, log: Event
         running.ring = sample_ring(options["ring"], log)
         guardian.on_ports = running.move_ports
         kept = options["kept"] or left_of(CleanShutdownMarker(Path(options["state"])).left)
-        ready = await running.start(
-            options["bind"],
-            Handover(kept, record=options["record"]),
-            restarted=Ending.from_json(options["restarted"]),
-        )
+        handover, restarted = Handover(kept, record=options["record"]), Ending.from_json(options["restarted"])
+        ready = await running.start(options["bind"], handover, restarted=restarted)
         ready = replace(ready, notes=ready.notes + notes, http=listeners.addresses)
         gc.collect()
         gc.freeze()

@@ -122,6 +122,27 @@ def test_behind_a_death_the_frames_of_a_program_that_has_just_hung_press_not(act
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
 
 
+def test_behind_a_death_a_takeover_counts_no_more_that_was_refused_for_its_heartbeat() -> None:
+    """In the next process it was a first one: another master enabled 8 N, and the frame of a hung program pressed 30 N."""
+    kept: dict[str, Any] = {}
+
+    def begun() -> SmallRig:
+        rig = SmallRig(settings(lease_s=LEASE_S))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.beats = False
+        return rig
+
+    frame = (ENABLE | TAKE, *HUNG[1:])
+    rig = begun()
+    rig.write(0, *frame, peer=OTHER)
+    for word in (ENABLE | TAKE, ENABLE):
+        rig.write(0, word, 800, 0, 0, 1)
+        refused = rig.answer(0, *frame, peer=OTHER)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+        assert kept["lost_beats"] == {OTHER.host: 139} and rig.bank.owner == OWNER.host
+        rig = begun()
+
+
 def test_behind_a_death_a_hung_program_takes_no_force_of_a_living_master_over_by_bit_3_of_its_last_frame() -> None:
     kept: dict[str, Any] = {"lost_beats": {OTHER.host: 139}}
     rig = SmallRig(settings(lease_s=LEASE_S))
