@@ -1,10 +1,14 @@
 """What the refit of the base model has changed in the rig's plant: by how much it was off as it stood, and by which number."""
 
 from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from gateway.diagnosis import Diagnosis, Options, diagnose
+from gateway.diagnosis.model_fit.refit_effect import _errors_n
 from gateway.diagnosis.result import Refit
 from gateway.reports.diagnosis.document import diagnosis_document
 from gateway.twin.plant import Plant
@@ -51,3 +55,17 @@ def test_of_a_plant_that_was_changed_before_nothing_is_told() -> None:
     found = diagnose([measurement], MACHINE).refit
     assert found is not None and not found.is_own
     assert "refit" not in diagnosis_document(diagnose([measurement], MACHINE), 1.0)
+
+
+def test_an_offset_of_a_recording_is_no_error_of_the_plant() -> None:
+    """Each has one of its own, which a tare would take away."""
+    parts = (slice(0, 40), slice(40, 100))
+    wave_n = 0.3 * np.sin(np.arange(100.0))
+    measured_n = wave_n + np.where(np.arange(100) < 40, 5.0, -2.0)
+    judged = np.arange(100) % 7 != 0
+    bench: Any = SimpleNamespace(
+        measured_n=measured_n, judged=judged, channels=[SimpleNamespace(rows=rows) for rows in parts],
+        simulate=lambda models: np.zeros((len(models), 100)),
+        rms_n=lambda residual_n: float(np.sqrt(np.mean(residual_n[judged] ** 2))),
+    )  # fmt: skip
+    assert _errors_n(bench, [None]) == pytest.approx([0.3 / np.sqrt(2.0)], rel=0.1)  # type: ignore[list-item]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gateway.live import control_link
-from gateway.live.control_link import ControlLink, ask_once
+from gateway.live.control_link import ControlLink, RemovedStateError, ask_once
 from gateway.processes.json_socket.connection import SocketLimits
 from gateway.processes.json_socket.messages import Answer
 from gateway.processes.json_socket.server import JsonLineServer
@@ -80,8 +80,11 @@ def test_a_restarted_control_is_found_again_and_an_absent_one_is_said_to_be(tmp_
             await control.close()
         with pytest.raises(OSError):
             await link.ask({"do": "echo", "n": 3})
-        with pytest.raises(OSError):
+        with pytest.raises(OSError) as absent:
             await ask_once(tmp_path, {"do": "echo", "n": 3})
+        assert not isinstance(absent.value, RemovedStateError), "its directory is there"
+        with pytest.raises(RemovedStateError, match="E152"):
+            await ask_once(tmp_path / "removed", {"do": "echo", "n": 3})
         await link.close()
 
     asyncio.run(scene())

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from math import inf
+from types import SimpleNamespace
 
 import pytest
 
 from gateway.bsfm import Bsfm
+from gateway.cli.plants.store_access import save_diagnosed
 from gateway.numbered_documents.store import StoreError
 from gateway.plants.in_use import compensation_on, in_use_facts, with_cell_terms, with_plant_in_use
 from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
@@ -156,3 +158,14 @@ def test_what_was_diagnosed_from_straightened_readings_comes_on_top_of_what_stra
     again = with_cell_terms(bowed(cell__quadratic_per_n=0.0005), facts["cell"])
     assert again.plant.cell.quadratic_per_n == pytest.approx(0.0025)
     assert with_cell_terms(bowed(), None) == bowed()
+
+
+def test_a_plant_that_is_kept_of_straightened_readings_has_what_straightened_them(tmp_path):
+    """In use without it, control would straighten no more, and the force would be off by all of it again."""
+    sources = SimpleNamespace(
+        paths=(), rig="demo", is_rehearsal=False, plant=SimpleNamespace(name="paper-slide"),
+        straightened={"quadratic_per_n": 0.002},
+    )  # fmt: skip
+    diagnosis = SimpleNamespace(verdict=SimpleNamespace(value="confirmed"), causes=())
+    number = save_diagnosed(tmp_path, diagnosis, sources, bowed(cell__quadratic_per_n=0.0005))
+    assert PlantStore(tmp_path).load(number).profile.plant.cell.quadratic_per_n == pytest.approx(0.0025)

@@ -184,8 +184,11 @@ def test_nan_and_infinity_hold_the_last_voltage_and_change_nothing(library):
     assert build.each("rising_voltage", [(NAN,), (INF,)]) == [(0.0, Code.INVALID)] * 2
 
 
+DAMAGES = ("memory nan", "memory 1.5", "force_n nan", "force_n inf", "force_n -5", "voltage_v nan", "voltage_v 9")
+
+
 @needs_gcc
-@pytest.mark.parametrize("damage", ["memory nan", "memory 1.5", "force_n inf", "force_n -5", "voltage_v 9"])
+@pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_state_gives_the_lowest_voltage(library, damage):
     build = library("demo", "-O2")
     build.command(state := build.reset(), [30.0])

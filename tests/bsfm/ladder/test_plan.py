@@ -69,6 +69,16 @@ def test_coarse_counts_are_not_outliers_and_single_readings_are_kept(loops):
     assert inlier_mask(once).all()
 
 
+def test_of_two_readings_that_differ_nobody_can_say_which_is_wrong(loops):
+    """Both stay: their median is as far from the one as from the other."""
+    twice = (ladder := loops["smooth"](2, noise_n=0.02)).part(ladder.group < 2)
+    force = np.array(twice.force_n)
+    force[17] += 3.0
+    assert inlier_mask(Ladder(twice.voltage_v, force, twice.direction, twice.group)).all()
+
+
 def test_huber_plays_down_what_is_far():
     weights = huber_weight(np.array([0.1, -0.1, 0.12, -0.08, 10.0]))
     assert weights[:2].tolist() == [1.0, 1.0] and 0.0 < weights[4] < 0.1
+    even = np.linspace(-1.0, 1.0, 1001)  # a robust standard deviation of 0.74
+    assert np.flatnonzero(huber_weight(even) == 1.0).tolist() == np.flatnonzero(np.abs(even) < 0.997).tolist()

@@ -286,3 +286,12 @@ def test_a_table_of_which_every_row_is_left_out_is_told_why(tmp_path: Path) -> N
     path.write_text("time_s,force_n\n0,5,1,2\n0,6,1,3\n0,7,1,4\n")
     with pytest.raises(RecordingError, match=r"no row can be read: line 2 has 4 cells, the header 2 .*decimal commas"):
         read_table(path, lenient=True)
+
+
+def test_a_row_that_is_commented_out_is_no_row(tmp_path: Path) -> None:
+    """Beside a first column of words it reads like any other."""
+    rows = [f"ok,{0.01 * k:.2f},1.0,{7.0 + k}" for k in range(80)]
+    rows[40:40] = ["#bad,0.395,1.0,-9999"]
+    (tmp_path / "a.csv").write_text("\n".join(["what,time_s,command_v,force_n", *rows]) + "\n")
+    read = read_table(tmp_path / "a.csv")
+    assert (read.rows, float(read.columns["force_n"].min())) == (80, 7.0)

@@ -223,3 +223,19 @@ def test_what_a_column_of_quality_calls_good_may_still_be_no_witness() -> None:
     force_n[7] = np.nan
     found = measured(time_s=TIME_S + gap_s, force_n=force_n, quality=np.zeros(N))
     assert np.flatnonzero(~found.usable).tolist() == [7, *range(400, 500)]
+
+
+def test_a_position_with_a_hole_is_in_metres_too() -> None:
+    position_mm = 10.0 + 5.0 * np.sin(TIME_S)
+    position_mm[7] = np.nan
+    found = measured(position_mm=position_mm).position_m
+    assert found is not None and np.nanmax(np.abs(found - 1.0e-3 * position_mm)) < 1.0e-12
+    assert found[7] == pytest.approx(1.0e-3 * (10.0 + 5.0 * np.sin(TIME_S[7])), rel=1.0e-4)
+
+
+def test_a_leap_of_the_clock_is_at_the_row_behind_it() -> None:
+    times_s = np.arange(60) * 0.01
+    times_s[40:] += 86_400.0
+    table = Recording(Path("a.csv"), {}, {"time_s": times_s}, 60, False, lines=range(2, 62))
+    with pytest.raises(RecordingError, match=r"^a\.csv:42, column time_s: 24 h after the row before"):
+        check_time_axis(table)

@@ -246,7 +246,9 @@ def test_where_the_residual_is_largest_is_said_beside_it_and_below() -> None:
     spike[1234] += 40.0
     html = page(diagnosis(traces=(replace(one, measurement=replace(one.measurement, force_n=spike)),)))
     assert re.search(r">before: \+(38|39)\.\d\d N</text>", html)
-    assert re.search(r"Largest before: \+(38|39)\.\d\d N at 6\.17 s, (while|with|within)", html)
+    assert re.search(r"Largest before: \+(38|39)\.\d\d N at 6\.17 s, (while|with|within)[^;<]*; after: ", html)
+    unchanged = page(diagnosis(traces=(one,), causes=(), verdict=Verdict.NOTHING_FOUND, leftover=()))
+    assert re.search(r"Largest before: [^;<]*\.<", unchanged), "without a cause there is no after"
 
 
 def test_a_size_that_the_plant_had_already_is_told_beside_the_new_one() -> None:

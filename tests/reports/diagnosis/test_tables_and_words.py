@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from gateway.diagnosis.input_checks import Suspect
-from gateway.diagnosis.result import Leftover, NotIdentifiable, Rejected
+from gateway.diagnosis.result import Estimate, Leftover, NotIdentifiable, Rejected
 from gateway.reports.diagnosis import headline, tables
 from gateway.reports.diagnosis import wording as words
 from gateway.reports.diagnosis.series import FALLING, RISING, ResidualRows
+from gateway.twin.plant import Plant
 from tests.reports.fake_diagnosis import FRICTION, diagnosis, trace
 
 
@@ -31,6 +32,19 @@ def test_of_what_lost_the_nearest_comes_first() -> None:
     lost = (Rejected("presliding", 0.094), Rejected("creep", 0.003), Rejected("viscous-friction", 0.212))
     told = [row[0] for row in cells(tables.rejected_table(diagnosis(rejected=lost), {}))]
     assert told == ["viscous-friction", "presliding", "creep"]
+    many = diagnosis(rejected=tuple(Rejected(f"effect-{k}", 0.01 * k) for k in range(15)))
+    html = tables.rejected_table(many, {})
+    assert len(cells(html)) == 12 and "3 more gain less than these" in html
+
+
+def test_a_limit_that_was_never_met_is_no_size_that_was_there_before() -> None:
+    found = Estimate("regulator", 4.0e5, "Pa", (3.9e5, 4.1e5))
+    assert words.previous_value(replace(diagnosis(), base=Plant()), "supply_pa", found) == ""
+
+
+def test_the_bar_of_a_share_is_as_long_as_the_share() -> None:
+    html = tables.causes_table(diagnosis(causes=(FRICTION,)), {})
+    assert "width:96%" in html and "> 96 %" in html
 
 
 def test_a_column_s_name_is_no_markup() -> None:
@@ -39,9 +53,10 @@ def test_a_column_s_name_is_no_markup() -> None:
 
 
 def test_each_direction_has_its_own_numbers_before_and_after() -> None:
-    way = np.array([RISING, RISING, FALLING])
-    rows = ResidualRows(np.array([1.0, 3.0, -2.0]), np.array([0.5, 0.5, 0.25]), {}, way)
-    rising, falling = cells(tables.directions_table(rows))
+    way = np.array([RISING, RISING, FALLING, 0])
+    rows = ResidualRows(np.array([1.0, 3.0, -2.0, 7.0]), np.array([0.5, 0.5, 0.25, 8.0]), {}, way)
+    rising, falling, neither = cells(tables.directions_table(rows))
+    assert neither == ["not yet moved", "1", "7.000 N", "7.000 N", "8.000 N", "8.000 N"]
     assert rising == ["rising", "2", "2.000 N", "2.236 N", "0.500 N", "0.500 N"]
     assert falling == ["falling", "1", "−2.000 N", "2.000 N", "0.250 N", "0.250 N"]
 

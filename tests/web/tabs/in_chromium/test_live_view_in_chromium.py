@@ -119,6 +119,22 @@ def test_an_alarm_says_how_long_it_stands_and_the_keyboard_stays_beside_it(windo
     assert seen["focused"] == "OL"
 
 
+ACKNOWLEDGED = """async (state) => {
+  const { makeAlarms } = await import("/static/live/health.js");
+  const asked = [];
+  const alarms = makeAlarms({ on: () => {}, say: () => {}, post: async (path) => asked.push(path) });
+  alarms.state(state);
+  for (const button of alarms.element.querySelectorAll("button")) button.click();
+  return asked;
+}"""
+
+
+def test_to_acknowledge_a_fault_resets_it_and_a_warning_needs_none(window) -> None:
+    silent = LiveAlarm(code="A311", title="no fresh force sample", cure="Look.", since_unix_s=98.0)
+    warned = state(faults=(silent,), warnings=(replace(silent, code="A342"),))
+    assert window.evaluate(ACKNOWLEDGED, warned.to_json()) == ["/api/v1/command/reset"]
+
+
 def test_a_fault_is_answered_on_the_page_by_the_pages_own_button(window) -> None:
     """Beside `Acknowledge and reset` it said `write force_setpoint 0, then raise control_word bit 1`."""
     silent = LiveAlarm(code="A311", title="no fresh force sample", cure="Look.", since_unix_s=98.0)

@@ -194,6 +194,25 @@ def test_an_unreadable_recording_has_no_time_and_no_duration(page, state, chromi
     window.close()
 
 
+def test_what_a_diagnosis_finds_is_kept_as_a_plant_where_that_is_asked_for_and_else_not(page, state, chromium) -> None:
+    record(state)
+    window, asked = open_tab(chromium, page.address, "diagnosis"), list[bool]()
+
+    def answer(route: Any) -> None:
+        asked.append(route.request.post_data_json["keep_plant"])
+        route.fulfill(status=409, json={"error": f"seen {len(asked)}"})
+
+    window.route("**/api/v1/diagnosis/begin", answer)
+    begin = window.get_by_role("button", name="Diagnose", exact=True)
+    begin.click()
+    window.get_by_text("seen 1").wait_for()
+    window.get_by_label("Keep what it finds as a numbered plant").check()
+    begin.click()
+    window.get_by_text("seen 2").wait_for()
+    assert asked == [False, True]
+    window.close()
+
+
 def test_a_table_that_is_wider_than_a_tablet_scrolls_within_itself(page, state, chromium) -> None:
     """The page was 43 px too wide beside the calibrations: the unseen head of their buttons stood beyond its edge."""
     window = open_tab(chromium, page.address, "calibrations")
