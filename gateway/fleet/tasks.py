@@ -8,6 +8,7 @@ import glob
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from datetime import date
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Final
@@ -56,7 +57,15 @@ def _task_of(path: str) -> Task:
             own = file_digest(stream, "sha256").hexdigest()
     except OSError:
         own = ""
-    return Task(path, keys.get("cell", ""), keys.get("date", ""), own)
+    return Task(path, keys.get("cell", ""), _spelt_one_way(keys.get("date", "")), own)
+
+
+def _spelt_one_way(text: str) -> str:
+    """Return a day with its dashes, for 20261101 is the same, and days are put in order as texts; what is no day as it is."""
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        return text
 
 
 def error_row(task: Task, error: BaseException | str) -> Row:

@@ -1,6 +1,10 @@
 """A file of a fleet, and the row of one that has no answer."""
 
-from gateway.fleet.tasks import Task, error_row
+from pathlib import Path
+
+import pytest
+
+from gateway.fleet.tasks import Task, error_row, find_tasks
 from gateway.recording import RecordingError
 
 
@@ -15,3 +19,20 @@ def test_an_error_row_does_not_say_its_file_twice() -> None:
 def test_a_file_that_may_not_be_read_is_told_without_a_number_and_its_name_once() -> None:
     error = PermissionError(13, "Permission denied", "recordings/bad.fgr")
     assert error_row(Task("recordings/bad.fgr", "7", "", ""), error)["error"] == "Permission denied"
+
+
+@pytest.mark.parametrize(
+    ("written", "date"),
+    [
+        ("2026-11-01", "2026-11-01"),
+        ("20261101", "2026-11-01"),
+        ("2026-W44-7", "2026-11-01"),
+        ("1.11.2026", "1.11.2026"),
+    ],
+)
+def test_a_day_is_one_however_its_folder_spells_it(tmp_path: Path, written: str, date: str) -> None:
+    """Of a cell with both spellings days were out of order, as texts are put, and one day was two."""
+    folder = tmp_path / "cell=7" / f"date={written}"
+    folder.mkdir(parents=True)
+    (folder / "press.csv").write_text("time_s\n")
+    assert [(one.cell, one.date) for one in find_tasks([f"{folder}/*.csv"])] == [("7", date)]
