@@ -14,7 +14,7 @@ from typing import Any
 import hypothesis
 import pytest
 
-from tests.gate.budgets import leave_out_long
+from tests.gate.budgets import SAMPLED, leave_out_long
 from tests.gate.tried_again import TriedAgain
 from tests.gate.workers import ForkedWorkers, OneCompiler
 
@@ -32,9 +32,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def draw_examples(*, at_random: bool) -> None:
-    """The same examples in each push, new ones in a long run, which prints how to draw a failing one again. No example has a
-    bound in time: a busy machine is no fault."""
-    hypothesis.settings.register_profile("ours", derandomize=not at_random, deadline=None, print_blob=True)
+    """The same examples in each push, new ones in a long run and three times as many, which prints how to draw a failing one
+    again. No example has a bound in time: a busy machine is no fault."""
+    count = 100 if at_random else -(-100 // SAMPLED)
+    hypothesis.settings.register_profile(
+        "ours", derandomize=not at_random, deadline=None, print_blob=True, max_examples=count
+    )
     hypothesis.settings.load_profile("ours")
 
 

@@ -17,6 +17,7 @@ from gateway.registers.upload.staging import Staged, check_staged
 from gateway.registers.words import CommitNotice, CommitStatus
 from tests.calibrations.coefficients import calibration, staged
 from tests.calibrations.upload_bench import COMMIT, PEER, Bench
+from tests.gate.budgets import examples
 
 COMMITTED = (CommitStatus.COMMITTED, 0, 0)
 DEMO = load_calibration("demo")
@@ -179,7 +180,7 @@ def calibrations(draw: st.DrawFn) -> Calibration:
     return given
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(derandomize=True, deadline=None, max_examples=examples(30))
 @given(calibrations())
 def test_whatever_a_calibration_is_its_words_make_the_same_words_again(given_set):
     limits = CoefficientLimits(cell_range_n=150.0)

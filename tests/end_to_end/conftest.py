@@ -15,7 +15,7 @@ import pytest
 from pymodbus.client import ModbusTcpClient
 
 OWNER_IP = 116
-POLL_S = 0.005
+POLL_S = 0.02
 """Between two questions of a test that waits: without it both its processor and the gateway's are full."""
 
 

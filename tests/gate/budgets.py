@@ -4,10 +4,17 @@ from collections.abc import Iterator
 from typing import Final
 from zlib import crc32
 
+import hypothesis
 import pytest
 
 SAMPLED: Final = 3
-"""Of so many cases of a table one is run in the push gate."""
+"""Of so many cases of a table, or examples of a law, one is run in the push gate."""
+
+
+def examples(count: int) -> int:
+    """Return how many examples hypothesis draws: so many in a long run, one in three of them in the push gate."""
+    is_push = hypothesis.settings.default is not None and hypothesis.settings.default.derandomize
+    return -(-count // SAMPLED) if is_push else count
 
 
 def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:

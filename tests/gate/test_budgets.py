@@ -5,8 +5,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from hypothesis import settings
+from hypothesis._settings import local_settings
 
-from tests.gate.budgets import leave_out_long
+from tests.gate.budgets import examples, leave_out_long
 
 
 class Item(SimpleNamespace):
@@ -51,3 +53,13 @@ def test_in_silence_what_is_left_out_is_gone() -> None:
     items = table("test_a", 6, "sampled")
     leave_out_long(items, in_silence=True)
     assert len(items) == 2
+
+
+@pytest.mark.parametrize(("is_push", "drawn"), [(True, [34, 1]), (False, [100, 1])])
+def test_hypothesis_draws_a_third_of_the_examples_in_a_push_and_never_none(is_push: bool, drawn: list[int]) -> None:
+    with local_settings(settings(derandomize=is_push)):
+        assert [examples(100), examples(1)] == drawn
+
+
+def test_where_no_number_is_said_it_is_that_of_a_hundred() -> None:
+    assert settings().max_examples == examples(100)

@@ -15,9 +15,10 @@ from gateway.bsfm import (
     validate_coefficients,
 )
 from tests.calibrations.coefficients import swapped
+from tests.gate.budgets import examples
 
 EPS = 2.0**-52
-MANY = settings(derandomize=True, deadline=None, max_examples=150)
+MANY = settings(derandomize=True, deadline=None, max_examples=examples(150))
 logs = st.floats(-6.0, 6.0)
 rises = st.floats(0.0, 9.0).map(lambda rise: rise if rise > 1e-3 else 0.0)
 
@@ -74,7 +75,7 @@ def test_slope_is_the_difference_quotient(curve, x):
     assert abs(curve.slope(x) - quotient) <= 1e-5 * (steepest + 1.0)
 
 
-@settings(MANY, max_examples=80)
+@settings(MANY, max_examples=examples(80))
 @given(any_curves())
 def test_monotone_test_agrees_with_dense_sampling_and_with_the_roots_of_the_derivative(curve):
     sampled = [curve.slope(i / 512) for i in range(1, 512)]

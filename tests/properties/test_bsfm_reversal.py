@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
+from tests.gate.budgets import examples
 
-MANY = settings(derandomize=True, deadline=None, max_examples=200)
+MANY = settings(derandomize=True, deadline=None, max_examples=examples(200))
 RISING = RationalBezier(0.0, 5.0, (0.0, 14.0, 38.0), (1.0, 0.9, 1.2))
 FALLING = RationalBezier(0.0, 5.0, (0.0, 22.0, 38.0), (1.0, 1.1, 1.2))
 SPAN_N = 3.0

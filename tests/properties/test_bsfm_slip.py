@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from gateway.bsfm import Branches, Bsfm, LinearBlend, Memory, RationalBezier, SlipStops
 from gateway.bsfm.slip.slip_stops import STIFFEST, half_width_bound_v, middle_and_half
+from tests.gate.budgets import examples
 
-MANY = settings(derandomize=True, deadline=None, max_examples=150)
+MANY = settings(derandomize=True, deadline=None, max_examples=examples(150))
 RISING = RationalBezier(0.0, 5.0, (0.5, 14.0, 38.0), (1.0, 0.9, 1.2))
 FALLING = RationalBezier(0.0, 5.0, (0.5, 24.0, 42.0), (1.0, 1.1, 1.2))
 BRANCHES = Branches(RISING, FALLING)

@@ -6,9 +6,12 @@ from hypothesis import strategies as st
 
 from gateway.twin import Contact, Cylinder, Friction, LoadCell, Plant, Regulator, Twin
 from gateway.twin.plant import with_value
+from tests.gate.budgets import examples
 from tests.twin.traces import trace
 
-_QUIET = settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+_QUIET = settings(
+    max_examples=examples(40), deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 
 
 def null_or(low: float, high: float) -> st.SearchStrategy[float]:

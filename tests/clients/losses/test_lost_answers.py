@@ -116,7 +116,6 @@ def test_what_is_asked_for_behind_a_loss_waits_for_off(
     assert gateway.bank.command.force_setpoint_n == (0.0 if gateway.exceptions else 20.0)
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize(
     "ask", [lambda client: client.enable(20.0), lambda client: client.tare()], ids=["force", "tare"]
 )

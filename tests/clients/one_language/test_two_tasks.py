@@ -255,8 +255,14 @@ def test_the_force_of_a_program_that_stands_ends_as_soon_at_a_gateway_that_answe
     assert 0.4 < ends_s[0] < 0.6 + 3 * answer_s and client.ended and "fgAlive" in client.text
 
 
-@pytest.mark.parametrize("before", [900, 900.4, 70000])
-@pytest.mark.parametrize("given", [600, 600.4, 70000])
+WORDS = [(before, given) for before in (900, 900.4, 70000) for given in (600, 600.4, 70000)]
+EACH_ONCE = [(900, 70000), (900.4, 600.4), (70000, 600)]
+"""A word that is whole, one that is rounded and one that is refused, on either side: in the push gate each beside one other."""
+
+
+@pytest.mark.parametrize(
+    ("before", "given"), [pytest.param(*pair, marks=[] if pair in EACH_ONCE else pytest.mark.long) for pair in WORDS]
+)
 def test_a_word_that_is_set_beside_an_exchange_is_the_one_that_is_sent_and_costs_no_force(
     before: float, given: float
 ) -> None:

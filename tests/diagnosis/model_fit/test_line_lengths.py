@@ -26,7 +26,7 @@ AT_9600_BAUD_S = 10.0 / 9600.0
 def own_recording() -> tuple[Measurement, Plant]:
     """Random steps of the demo rig, whose regulator takes `SET 0` .. `SET 1023` at 9600 baud."""
     with TemporaryDirectory() as folder:
-        path = recorded("random", 2, Path(folder), 50.0)
+        path = recorded("random", 2, Path(folder), 25.0)
         sources = read_sources([str(path)], rig=None, columns=None, state=None)
     return sources.measurements[0], with_value(sources.plant.plant, "cell", "noise_n", 0.0)
 

@@ -17,6 +17,7 @@ from gateway.profiles.kinds.plants import read_plant
 from gateway.profiles.strict_yaml.text import parse
 from gateway.twin import Plant
 from gateway.twin.plant import values, with_value
+from tests.gate.budgets import examples
 
 
 def again(profile: PlantProfile, comment: str = "") -> PlantProfile | None:
@@ -109,7 +110,7 @@ def profiles(draw: Any) -> PlantProfile:
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(profiles())
 def test_any_plant_is_read_back_to_the_last_bit(profile: PlantProfile) -> None:
     assert again(profile) == replace(profile)

@@ -13,6 +13,7 @@ from gateway.recording import Recording, RecordingError, read_table
 from gateway.recording.measurement import measurement_of
 from gateway.recording.tables import csv_dialect
 from gateway.recording.tables.mapping_file import column_mapping
+from tests.gate.budgets import examples
 
 NEWTON = {"N": 1.0, "kgf": 9.80665, "mN": 1e-3, "lbf": 4.4482216152605, "kN": 1e3, "g": 9.80665e-3}
 SECOND = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
@@ -115,7 +116,7 @@ tables = st.lists(st.tuples(st.integers(1, 2000), values, values, values), min_s
 
 
 @given(rows=tables, how=dialects())
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(80), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_the_same_table_in_any_dialect_gives_the_same_numbers(rows: Rows, how: dict[str, str], tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     write(path, rows, how)

@@ -18,6 +18,7 @@ from gateway.recording.tables.any_table import read_table
 from gateway.recording.tables.column_mapping import select_columns
 from gateway.recording.tables.csv_dialect import detect_dialect
 from gateway.recording.tables.csv_table import read_csv
+from tests.gate.budgets import examples
 
 ROWS = [(0.0, 1.5, -0.25), (0.005, 1.5, 3.75), (0.01, 2.25, float("nan"))]
 NAMES = ("time_s", "command_v", "force_n")
@@ -199,7 +200,7 @@ cells = st.one_of(
 
 
 @given(rows=st.lists(st.tuples(cells, cells, cells), min_size=1, max_size=12), separator=st.sampled_from(",;\t"))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_the_fast_way_and_the_exact_way_agree(rows: list[tuple[str, ...]], separator: str, tmp_path: Path) -> None:
     path = tmp_path / "table.csv"
     path.write_text(separator.join(NAMES) + "\n" + "".join(separator.join(row) + "\n" for row in rows))

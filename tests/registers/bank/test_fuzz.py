@@ -12,6 +12,7 @@ from gateway.modbus import ModbusError, Peer, Role
 from gateway.registers import BankRules, Refusal, RegisterBank, Status
 from gateway.registers.words import ControlBit, State
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
+from tests.gate.budgets import examples
 
 PEERS = [Peer("10.0.0.1", 1, role=Role.CALIBRATION), Peer("10.0.0.2", 2), Peer("fe80::1", 3, "press", Role.ADMIN)]
 ADDRESSES = st.one_of(
@@ -81,7 +82,7 @@ def perform(bank: RegisterBank, step: tuple, peer: Peer) -> None:
         bank.release_owner()
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(300))
 @given(steps=st.lists(st.tuples(STEPS, st.sampled_from(PEERS)), max_size=25))
 def test_no_sequence_of_requests_breaks_the_bank(register_map, steps):
     rules = BankRules(rig_name="demo", force_max_n=60.0)
@@ -124,7 +125,7 @@ CYCLES = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 @given(writes=CYCLES)
 def test_the_short_way_of_a_plain_write_ends_where_the_long_one_does(register_map, writes):
     rules = BankRules(rig_name="demo", force_max_n=60.0)

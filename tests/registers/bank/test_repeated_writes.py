@@ -119,6 +119,7 @@ class Watched:
         return EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit(0), f"not {asked.changes()}") if is_refused else None
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("seed", range(6))
 def test_a_repeated_write_ends_where_one_that_is_judged_at_length_does(register_map: RegisterMap, seed: int) -> None:
     short, long = (Watched(register_map, has_short_way=has_short_way) for has_short_way in (True, False))
