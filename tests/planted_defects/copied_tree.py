@@ -11,7 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Final
 
-from tests.planted_defects.defects import Defect
+from tests.planted_defects.defects.defect import Defect
 
 ROOT: Final = Path(__file__).parents[2]
 _COPIED: Final = ("gateway", "profiles", "tests", "tools", "pyproject.toml", "README.md")

@@ -8,10 +8,37 @@ from pathlib import Path
 import pytest
 
 from tests.planted_defects.copied_tree import ROOT, copy_tree, failing_test, planted
-from tests.planted_defects.defects import DEFECTS, Defect
-from tests.planted_defects.defects_told import TOLD
+from tests.planted_defects.defects import (
+    clients,
+    commands,
+    devices,
+    faces,
+    force,
+    page_and_telemetry,
+    processes,
+    registers,
+    running_rig,
+    stored,
+    supervision,
+    told,
+)
+from tests.planted_defects.defects.defect import Defect
 
-ALL = (*DEFECTS, *TOLD)
+ROOMS = (
+    force,
+    supervision,
+    commands,
+    running_rig,
+    processes,
+    registers,
+    faces,
+    devices,
+    clients,
+    page_and_telemetry,
+    stored,
+    told,
+)
+ALL = tuple(one for room in ROOMS for one in room.DEFECTS)
 IN_GATE = ("the slew limit is dropped", "a damaged calibration is read")
 
 
