@@ -239,23 +239,26 @@ def _refuse_blocked(at: Situation, bit: ControlBit, what: str = "enable") -> Edg
 def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
     """Why nothing begins, and nobody takes over, by a command that has waited in a pile: its master may be gone, or expect no
     force any more, and somebody else may hold one."""
-    acts = edges.rises
-    if not command.has_waited or not acts:
+    if not command.has_waited:
         return None
-    bit = ControlBit(acts & -acts)
-    waits = f"{command.peer} asks more than is answered, so that this has waited"
-    return EdgeRefusal(RefusalReason.NOT_READY, bit, f"{str(bit.name).lower()} refused: {waits}: wait for each answer")
+    waits = f"{command.peer} asks more than is answered, so that this has waited: wait for each answer"
+    return _refuse_any_rise(RefusalReason.NOT_READY, edges, waits)
 
 
 def _repeated(command: Command, edges: Edges) -> EdgeRefusal | None:
     """Why nothing begins, and nobody takes over, by a frame that comes on and on, and has been refused, or was there before the
     restart: its program may stand still."""
-    acts = edges.rises
-    if not command.repeats or not acts:
+    if not command.repeats:
+        return None
+    beat = f"{command.peer} has written no other heartbeat than beside another owner, or before the restart: write one"
+    return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges, beat)
+
+
+def _refuse_any_rise(reason: RefusalReason, edges: Edges, why: str) -> EdgeRefusal | None:
+    if not (acts := edges.rises):
         return None
     bit = ControlBit(acts & -acts)
-    beat = f"{command.peer} has written no other heartbeat than beside another owner, or before the restart"
-    return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, bit, f"{str(bit.name).lower()} refused: {beat}: write one")
+    return EdgeRefusal(reason, bit, f"{str(bit.name).lower()} refused: {why}")
 
 
 def _no_run(reason: RefusalReason, why: str, plan: AnyPlan) -> EdgeRefusal:

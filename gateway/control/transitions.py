@@ -162,9 +162,8 @@ class Transitions:
             self.held_n = self.parts.loop.applied_n
             self.lose_master(now_s, commands.lost_sentence(now_s, line), action)
             return
-        lowered_n = (
-            commands.demand.force_n if commands.demand.mode is Mode.FORCE else inf
-        )  # at once, not along its ramp
+        demand = commands.demand
+        lowered_n = demand.force_n if demand.mode is Mode.FORCE else inf  # at once, not along its ramp
         self.held_n = min(self.held_n, self.parts.loop.applied_n, lowered_n)
         if before != self._unbeaten and not self.is_ramping_down:
             self.outcome.release_owner = True

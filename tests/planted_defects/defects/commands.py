@@ -46,7 +46,7 @@ DEFECTS = (
     Defect("a run begins beside a moving valve", "control/edge_checks.py",
            "(self._valve.is_pulling or self._valve.is_switching)", "self._valve.is_pulling", ("control/valve",)),
     Defect("an enable that has waited in a pile presses", "control/edge_checks.py",
-           "    if not command.has_waited or not acts:\n", "    if True:\n",
+           "    if not command.has_waited:\n", "    if True:\n",
            ("service/running_rig/masters/test_takeovers.py",)),
     Defect("ready is said beside a silent valve", "control/readiness.py",
            "block or (RefusalReason.VALVE_UNKNOWN if self._valve_words(now_s) else block)", "block", ("control/valve",)),

@@ -25,17 +25,23 @@ def test_esc_stops_also_behind_a_click_in_a_report(page, served: ScriptedControl
     window.close()
 
 
-def test_esc_stops_also_where_the_page_asks_again(page, served: ScriptedControl, state, chromium) -> None:
-    """The browser's own dialog took the key, and stopped all else meanwhile: a lease ended, and the force with it."""
-    from playwright.sync_api import expect
-
-    number = add_calibration(state, rejected="0.9 N RMS, allowed 0.5")
+def changed_at_hand(chromium: Any) -> tuple[Any, list[Any]]:
+    """A browser whose changes of calibrations are taken here, and what they asked for."""
     asked: list[Any] = []
     browser = chromium.new_context()
     browser.route(
         "**/api/v1/calibrations/change",
         lambda route: (asked.append(json.loads(route.request.post_data)), route.fulfill(json={"said": "it is in use"})),
     )
+    return browser, asked
+
+
+def test_esc_stops_also_where_the_page_asks_again(page, served: ScriptedControl, state, chromium) -> None:
+    """The browser's own dialog took the key, and stopped all else meanwhile: a lease ended, and the force with it."""
+    from playwright.sync_api import expect
+
+    number = add_calibration(state, rejected="0.9 N RMS, allowed 0.5")
+    browser, asked = changed_at_hand(chromium)
     window = open_tab(browser, page.address, "calibrations")
     window.get_by_role("button", name=f"Use calibration {number}").click()
     window.get_by_text("was rejected: 0.9 N RMS, allowed 0.5. Use it all the same?").wait_for()
@@ -51,12 +57,7 @@ def test_esc_stops_also_where_the_page_asks_again(page, served: ScriptedControl,
 def test_what_was_not_rejected_is_never_asked_for_by_force(page, served: ScriptedControl, state, chromium) -> None:
     """The gateway may know by then that its fit was rejected, and asks again: with force it would have obeyed."""
     number = add_calibration(state)
-    asked: list[Any] = []
-    browser = chromium.new_context()
-    browser.route(
-        "**/api/v1/calibrations/change",
-        lambda route: (asked.append(json.loads(route.request.post_data)), route.fulfill(json={"said": "it is in use"})),
-    )
+    browser, asked = changed_at_hand(chromium)
     window = open_tab(browser, page.address, "calibrations")
     window.get_by_role("button", name=f"Use calibration {number}").click()
     window.get_by_text("it is in use").wait_for()
