@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -184,10 +185,10 @@ def test_an_interrupt_right_behind_a_fork_ends_that_worker_too(tmp_path: Path) -
 
 
 def test_an_interrupt_ends_all_workers_with_their_fixtures(tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "begun")
-    waits = "def test_a():\n    Path('begun').write_text('x')\n    time.sleep(600)\n"
+    waits = "def test_a():\n    Path('begun').touch()\n    time.sleep(600)\n"
     run = run_in_workers(tmp_path, waits=waits)
-    assert (tmp_path / "begun").read_text() == "x"
+    while not (tmp_path / "begun").exists() and run.poll() is None:  # a run that ends early is told below, not waited for
+        time.sleep(0.01)
     run.send_signal(signal.SIGINT)
     said, _ = run.communicate()
     assert run.returncode == 2 and "KeyboardInterrupt" in said
