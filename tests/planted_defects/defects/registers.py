@@ -51,7 +51,7 @@ DEFECTS = (
     Defect("the byte order need not be proven", "registers/writes/admission.py",
            "if rises & STARTS and self._rules.require_byte_order_echo and not", "if False and not", BANK),
     Defect("an enable in a float block needs no proven byte order", "registers/writes/admission.py",
-           "if rises & STARTS or is_taken_over:", "if (rises & STARTS or is_taken_over) and not write.block.repeats:",
+           "if not rises & (STARTS | TAKE):", "if word_at or not rises & (STARTS | TAKE):",
            ("registers/bank/test_ownership.py",)),
     Defect("the 1 of a run that stops another's lets its own go", "registers/writes/admission.py",
            "is_taken_over, self._held_by(write, written, asked)", "is_taken_over, self._held_by(write, written, written)",
