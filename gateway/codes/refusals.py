@@ -278,8 +278,8 @@ class RefusalReason(IntEnum):
         Explanation(
             "W302",
             "reset, enable or more without a new heartbeat",
-            "With a lease: the heartbeat of before is beside a reset, second takeover, enable behind a loss or another's stop, "
-            "or more than is held then.",
+            "With a lease: the heartbeat of before is beside a reset, second takeover, enable behind a loss, a stop or a "
+            "refusal, or more than is held then.",
             "The master writes the bit without its heartbeat, or its program stands still and its last frame is repeated.",
             "Write the bit and another heartbeat value in one request; with a reset force_setpoint 0, too.",
         ),

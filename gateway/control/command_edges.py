@@ -145,6 +145,10 @@ class CommandTracker:
         """Start the lease at enable: the master has one length of the lease to beat."""
         self._lease.start(now_s, self.command.peer)
 
+    def let_no_beat_count(self) -> None:
+        """Let nothing begin by a heartbeat of before."""
+        self._lease.let_no_beat_count()
+
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)

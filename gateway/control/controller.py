@@ -325,6 +325,6 @@ class Controller:
         if isinstance(event, StopCause):
             self._machine.fail(now_s, event)
         elif self._machine.is_ramping_down and self._loop.applied_n <= 0.0:
-            self._machine.disable("force ramped to 0, output disabled")
+            self._machine.end_ramp()
         else:
             self._machine.fire(event)

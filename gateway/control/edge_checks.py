@@ -53,15 +53,14 @@ class EdgeCheck:
 
     def refusal(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
         """Return why this write cannot be taken now; None takes it."""
-        edges = self._commands.edges_of(proposal.command)
+        command = proposal.command
+        edges = self._commands.edges_of(command)
         if not edges.stops and (
-            busy := self._busy(proposal, edges, at)
-            or _old(proposal.command, edges)
-            or _repeated(proposal.command, edges)
-            or self._rises_unbeaten(proposal.command, at)
+            busy := self._busy(proposal, edges, at) or _old(command, edges) or self._rises_unbeaten(command, at)
         ):
             return busy
-        return next(self._refusals(proposal.command, edges, at), None)
+        refused = next(self._refusals(command, edges, at), None)  # what has to change first
+        return refused or (None if edges.stops else _repeated(command, edges))
 
     def of_run(self, plan: AnyPlan, at: Situation) -> EdgeRefusal | None:
         """Return why a run cannot begin now, for whoever asks; None begins it."""
@@ -250,7 +249,7 @@ def _repeated(command: Command, edges: Edges) -> EdgeRefusal | None:
     restart: its program may stand still."""
     if not command.repeats:
         return None
-    beat = f"{command.peer} has written no other heartbeat than beside another owner, or before the restart: write one"
+    beat = f"{command.peer} has written no other heartbeat than with what was refused, or before the restart: write one"
     return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges, beat)
 
 

@@ -122,6 +122,12 @@ class Transitions:
         self.fire(StateEvent.DISABLE)
         self._let_go(sentence)
 
+    def end_ramp(self) -> None:
+        """Switch the output off at the end of the way to 0 N. What was written on that way with enable at 1 asked for nothing:
+        the same frame, on and on, must not be a rise behind it."""
+        self.parts.commands.let_no_beat_count()
+        self.disable("force ramped to 0, output disabled")
+
     def fail(self, now_s: float, cause: StopCause) -> None:
         """Latch a first cause: the safe voltage at once, and the command with it."""
         self._latch(now_s, cause.fault)

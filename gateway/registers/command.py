@@ -18,8 +18,8 @@ class Command(NamedTuple):
     number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address.
     stops: whatever the control word was, this write wants the output off. lowered_from_n: what the master wrote as setpoint
     before a calibration with a smaller limit lowered it, 0 where none did. has_waited: it was asked for a while ago, in a pile
-    of requests: its master may be long gone. repeats: no other heartbeat than when its master was refused as not the
-    owner, or in the process before: its program may stand still.
+    of requests: its master may be long gone. repeats: no other heartbeat than when its master was refused, or in the
+    process before: its program may stand still.
     """
 
     control_word: ControlBit = _NO_BIT

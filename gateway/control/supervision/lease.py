@@ -62,6 +62,10 @@ class Lease:
             if other != who and self.is_within(beaten_s, now_s):
                 self._beats[other] = heartbeat, nan
 
+    def let_no_beat_count(self) -> None:
+        """Let no beat of before count, whose ever: the output goes off, and nobody has asked for that just now."""
+        self._beats = {who: (heartbeat, nan) for who, (heartbeat, _) in self._beats.items()}
+
     def would_start_for(self, who: str) -> bool:
         """Return whether a takeover by this master would start its lease."""
         return who not in (self._master, *self._unbeaten)

@@ -2,8 +2,10 @@
 
 Staging takes words one at a time, for masters that have only FC06; nothing there is judged until the commit word is
 written. commit and slot_select act when written and are passed on; who serves them reports with `show_commit`. While a
-commit is under way staging writes are refused (06). An upload needs no ownership of the setpoint, but the calibration
-role (gateway.registers.roles), which plain faces have only where the rig allows it.
+commit is under way staging writes are refused (06), and so is a commit of words of which another master has staged some: it
+would be told as committed what that one has staged, or its set would go into that one's slot, which no CRC-32 covers. An
+upload needs no ownership of the setpoint, but the calibration role (gateway.registers.roles), which plain faces have only where
+the rig allows it.
 """
 
 from collections.abc import Callable
@@ -18,6 +20,7 @@ from gateway.registers.refusal import Refusal
 from gateway.registers.upload.coefficients import (
     BLOCK_BYTES,
     HEAD_BYTES,
+    HEAD_WORDS,
     SET_WORDS,
     TAIL_FROM,
     CoefficientSet,
@@ -64,6 +67,8 @@ class StagingBlock:
         ]
         self._active_first = register_map.find("order@active").address
         self._status = CommitStatus.IDLE
+        self._staged_by: dict[int, str] = {}  # address -> who has staged its word last
+        self._no_words = (self._commit, self._select)
         for block, first in (("staging", self._first), ("active", self._active_first)):
             for register in register_map.registers_of(block):
                 at = first + _PLACES.get(register.name, register.address - first)
@@ -108,8 +113,9 @@ class StagingBlock:
 
     def _store(self, address: int, data: bytes, peer: Peer) -> None:
         """All or nothing, also when the commit is refused."""
-        before = self._image.read(address, len(data) // 2)
+        before, staged_by = self._image.read(address, len(data) // 2), self._staged_by
         self._image.write(address, data)
+        self._staged_by = staged_by | dict.fromkeys(range(address, address + len(data) // 2), peer.identity)
         try:
             if address <= self._commit < address + len(data) // 2:
                 self._act(peer)
@@ -117,6 +123,7 @@ class StagingBlock:
                 self._choose(peer)
         except Refusal:
             self._image.write(address, before)
+            self._staged_by = staged_by
             raise
 
     def _act(self, peer: Peer) -> None:
@@ -129,11 +136,21 @@ class StagingBlock:
             raise Refusal(RefusalReason.COEFFICIENTS, self._commit, text, value=word)
         if word and word != CommitAction.DRY_RUN:
             _check_in_time("commit", self._commit, peer)
+        if word in (CommitAction.COMMIT, CommitAction.DRY_RUN):
+            self._check_staged_by(peer)
         self._image.write(self._commit, b"\0\0")
         if word and self.on_commit is not None:
             staged = self._image.read(self._first, BLOCK_BYTES // 2)
             self.on_commit(CommitAction(word), staged, peer)
             self.on_act("commit", CommitAction(word).name.lower(), peer)
+
+    def _check_staged_by(self, peer: Peer) -> None:
+        has_tail = self._image.word(self._first + _PLACES["length"]) != HEAD_WORDS
+        end = BLOCK_BYTES // 2 if has_tail else TAIL_FROM
+        who = {by for at, by in self._staged_by.items() if at < self._first + end and at not in self._no_words}
+        if others := sorted(who - {peer.identity}):
+            text = f"commit refused: {', '.join(others)} has staged some of its words: stage all of them anew"
+            raise Refusal(RefusalReason.BUSY, self._commit, text)
 
     def _choose(self, peer: Peer) -> None:
         slot = self._image.word(self._select)

@@ -10,6 +10,7 @@ with it: taken for a stop alone, a guest's tare would be the end of the force, a
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
@@ -31,7 +32,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, StartFrame
 from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
@@ -42,6 +43,7 @@ STARTS: Final = ENABLE | RUN_BITS
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
+_BUSY: Final = (RefusalReason.NOT_OWNER, RefusalReason.CALIBRATING, RefusalReason.STOPPING)
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
@@ -99,6 +101,13 @@ class Admission:
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
+        try:
+            return self._admit(write, number, now_s)
+        except Refusal as refusal:
+            self._note_refused(write, refusal.reason, now_s)
+            raise
+
+    def _admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         commands, before = self._commands, self._commands.values
         values = commands.decode(write.block, write.address, write.data)
         asked, heartbeat = int(values[CONTROL_WORD]), int(values[HEARTBEAT])
@@ -125,13 +134,12 @@ class Admission:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
-        beat = heartbeat if HEARTBEAT in self._offsets(write) else None
-        repeats = self.held_enables.repeats(write.host, beat, now_s, takes=bool(written & TAKE))
+        repeats = not self._is_in_use(write.host) and self.held_enables.repeats(
+            write.host, self._frame(write, values, written), now_s
+        )
         command = command._replace(has_waited=write.has_waited, repeats=repeats)
         self._ask(command, permitted.values, write)
-        rises = written & ~int(before[CONTROL_WORD])
-        if rises & STARTS or is_taken_over:
-            self._check_starts(command, rises, commands.address(write.block, CONTROL_WORD))
+        self._check_starts(command, commands.address(write.block, CONTROL_WORD))
         self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
@@ -185,8 +193,6 @@ class Admission:
             return _PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
-        if HEARTBEAT in self._offsets(write):
-            self.held_enables.note_refused(write.host, int(values[HEARTBEAT]), now_s)
         raise self._not_owner(write.address, write.host)
 
     def _is_named_stop(self, write: Write, written: int) -> bool:
@@ -219,6 +225,30 @@ class Admission:
         stands = held | int(self._commands.values[CONTROL_WORD])
         return held & ~write.touched | stands & written & write.touched & RUN_BITS
 
+    def _is_in_use(self, host: str) -> bool:
+        """Whether the output is this host's: it begins nothing then, and a beat that came with what was refused is one."""
+        return self._ownership.owner == host and bool(int(self._commands.values[CONTROL_WORD]) & STARTS)
+
+    def _frame(self, write: Write, values: Values, word: int) -> StartFrame:
+        beat = int(values[HEARTBEAT]) if HEARTBEAT in self._offsets(write) else None
+        return StartFrame((write.address, write.data), beat, bool(word & TAKE))
+
+    def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
+        """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
+        may allow."""
+        if reason is RefusalReason.BYTE_ORDER_UNPROVEN or write.host in self.held_runs.by_host:
+            return  # its own proof, its own 0 are waited for
+        offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])
+        frame, asks = StartFrame((write.address, write.data)), CONTROL_WORD in offsets
+        with suppress(Refusal):
+            values = self._commands.decode(write.block, write.address, write.data)
+            word = int(values[CONTROL_WORD]) if asks else 0
+            frame, asks = self._frame(write, values, word), bool(word & STARTS)
+        if asks or (reason in _BUSY and frame.heartbeat is not None):
+            self.held_enables.note_refused(write.host, frame, standing, now_s)
+        elif frame.heartbeat is not None:
+            self.held_enables.note_refused_beat(write.host, frame.heartbeat)
+
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
         offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
         if HEARTBEAT in offsets:
@@ -236,6 +266,8 @@ class Admission:
             self.held_enables.note(write.host, command.received_s)
         if refused.reason is RefusalReason.HEARTBEAT_STALE and HEARTBEAT in self._offsets(write):
             self.held_enables.note_lost(write.host, command.heartbeat)
+        if command.repeats and refused.reason is RefusalReason.HEARTBEAT_STALE:
+            self._check_starts(command, self._commands.address(write.block, CONTROL_WORD))  # its own 0 comes first
         if not refused.bit:
             raise Refusal(refused.reason, write.address, refused.text)
         offsets = self._offsets(write)
@@ -254,8 +286,11 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_starts(self, command: Command, rises: int, word_at: int) -> None:
+    def _check_starts(self, command: Command, word_at: int) -> None:
         host, written = command.peer, int(command.control_word)
+        rises = written & ~int(self._commands.values[CONTROL_WORD])
+        if not rises & (STARTS | TAKE):
+            return
         enables = rises | (written if written & TAKE else 0)  # who takes over goes on with what another one has enabled
         if enables & ENABLE and self.held_enables.holds(host, command.received_s):
             text = "enable was kept at 1 over a fault: write it as 0 once, then as 1"

@@ -2,11 +2,12 @@
 
 They outlive the process: by a control that was started anew the holder's next cycle would begin another run, or press over a
 fault that was latched, and that nobody has reset. An enable that is written on and on over a latched fault would press by
-another master's reset alone, too: a reset begins nothing.
+another master's reset alone, too: a reset begins nothing. And a start that was refused, for whatever reason, and comes on and
+on with the same heartbeat would begin when that reason is over.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Final
+from typing import Final, NamedTuple
 
 _MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
@@ -40,6 +41,33 @@ class HeldRuns:
         self.by_host.update(held)
 
 
+class StartFrame(NamedTuple):
+    """A write, by what tells it from the one before. heartbeat: None where it brings none; takes: it takes over."""
+
+    data: tuple[int, bytes]  # where, and what
+    heartbeat: int | None = None
+    takes: bool = False
+
+
+class _Refused(NamedTuple):
+    """What was refused last of a host. heartbeat: its own, as far as it has brought one (`beats`), else the one that stood;
+    at_s: when it came last, s."""
+
+    frame: StartFrame
+    heartbeat: int
+    beats: bool
+    at_s: float
+
+    def is_same(self, frame: StartFrame) -> bool:
+        """Whether a frame brings nothing new. Of who beats one without a heartbeat does not: the one that stands may be
+        another's. Who is refused because another one owns is told to take over."""
+        if frame.takes and not self.frame.takes:
+            return False
+        if frame.heartbeat is None and self.beats:
+            return True
+        return frame.heartbeat == self.heartbeat or frame.data == self.frame.data
+
+
 class HeldEnables:
     """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
     all of them, of other times of the same ones once a second. has_lease: a heartbeat has to change; else none is noted. lost:
@@ -52,7 +80,7 @@ class HeldEnables:
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, int] = {}
         self._lost_now: dict[str, int] = {}
-        self._refused: dict[str, tuple[int, float]] = {}  # of each that is no owner its heartbeat, and when it came, s
+        self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
 
     def note(self, host: str, now_s: float) -> None:
@@ -75,29 +103,38 @@ class HeldEnables:
             del self._lost_now[next(iter(self._lost_now))]
         self.on_lost(dict(self._lost_now))
 
-    def note_refused(self, host: str, heartbeat: int, now_s: float) -> None:
-        """Note the heartbeat of a write that was refused because another host owns: the same one, on and on, is no beat."""
+    def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:
+        """Note a write that was refused: the same one, on and on, is of a program that may stand still. standing: the heartbeat
+        that stands."""
         if not self._has_lease:
             return
-        if self._refused.pop(host, (None,))[0] == heartbeat:
-            self.note_lost(host, heartbeat)
-        self._refused[host] = heartbeat, now_s
+        before = self._refused.pop(host, None)
+        if before and before.is_same(frame):
+            self.note_lost(host, before.heartbeat)
+        beats = frame.heartbeat is not None
+        known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
+        self._refused[host] = _Refused(frame, known, beats or bool(before and before.beats), now_s)
         if len(self._refused) > _MOST_HOLDERS:
             del self._refused[next(iter(self._refused))]
 
-    def repeats(self, host: str, heartbeat: int | None, now_s: float, *, takes: bool = False) -> bool:
+    def note_refused_beat(self, host: str, heartbeat: int) -> None:
+        """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""
+        if refused := self._refused.get(host):
+            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
+
+    def repeats(self, host: str, frame: StartFrame, now_s: float) -> bool:
         """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
-        was refused last: by the frame of a program that hung while another master owned, the machine would press when that one
-        stops. heartbeat: None where it brings none: the one that stands may be nobody's; takes: it takes over, as who is
-        refused is told to."""
-        if host in self.lost and heartbeat in (None, self.lost[host]):
+        was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
+        is over."""
+        if host in self.lost and frame.heartbeat in (None, self.lost[host]):
             return True
-        if takes or host not in self._refused or heartbeat not in (None, self._refused[host][0]):
+        if (refused := self._refused.get(host)) is None or not refused.is_same(frame):
             return False
-        refused, refused_s = self._refused.pop(host)
-        if now_s - refused_s >= _HELD_S:
+        if now_s - refused.at_s >= _HELD_S:
+            del self._refused[host]
             return False
-        self.note_refused(host, refused, now_s)
+        self.note_lost(host, refused.heartbeat)
+        self._refused[host] = refused._replace(at_s=now_s)
         return True
 
     def knows(self, host: str) -> bool:
@@ -116,7 +153,7 @@ class HeldEnables:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
         if self._lost_now.get(host, heartbeat) != heartbeat:
             self._find(host)
-        if host in self._refused and self._refused[host][0] != heartbeat:
+        if host in self._refused and self._refused[host].heartbeat != heartbeat:
             del self._refused[host]
 
     def let_go(self, host: str) -> None:

@@ -45,7 +45,8 @@ class Cell:
         return b"".join(one if self.block == "float_abcd" else one[2:] + one[:2] for one in floats)
 
     def write(self, rig: SmallRig) -> Refusal | None:
-        """Write as the owner; the refusal, where it is one."""
+        """Write as the owner; the refusal, where it is one. Each cell stands by itself: no other was refused before."""
+        rig.bank.held_enables.let_go(OWNER.identity)
         try:
             if self.block == "coils":
                 rig.bank.write_bits(0, [bool(int(self.values[0]) >> k & 1) for k in range(7)], OWNER)
@@ -58,6 +59,7 @@ class Cell:
 
     def outcome(self, rig: SmallRig) -> object:
         """What the bank would store and hand on, without doing it: equal ones have one future. Raises Refusal."""
+        rig.bank.held_enables.let_go(OWNER.identity)
         name = "command" if self.block == "coils" else self.block
         block = next(one for one in rig.bank._map.blocks if one.name == name)
         data = pack(">H", int(self.values[0])) if self.block == "coils" else self.data

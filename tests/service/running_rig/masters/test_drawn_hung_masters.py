@@ -1,7 +1,6 @@
-"""Masters whose programs hang while their last frame flows on, as a seed draws it, beside a page that stops and resets, deaths
-of control and restarts of the service: what repeats begins nothing and raises nothing.
-
-Where a force ramps to 0 behind a loss is left out: a program that hangs while it is refused for that has hung unseen.
+"""Masters whose programs hang while their last frame flows on, as a seed draws it, beside a page that stops and resets, a cell
+that goes silent, runs of this machine, deaths of control and restarts of the service: what repeats begins nothing and raises
+nothing.
 """
 
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any
 import pytest
 
 from gateway.control import LeaseAction
+from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.settings import Defaults
 from gateway.modbus import Peer
 from gateway.registers.words import State
@@ -20,7 +20,11 @@ from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
 from tests.service.running_rig.simulated_rig import ENABLE, RESET, TAKE, SmallRig
 
 MASTERS, PAGE = tuple(Peer(f"10.0.0.{number}") for number in (5, 6, 7)), Peer("web")
-PRESSING = State.RAMPING, State.HOLDING
+PRESSING = State.RAMPING, State.HOLDING, State.READY
+HAPPENINGS = (
+    *("hang", "hang", "go on", "ask", "ask", "idle", "stop"),
+    *("stop here", "reset", "5 N", "run here", "cell", "death", "restart"),
+)
 COUNT, STEPS = 2, 120
 SEEDS = 6, 11, 23
 """What was pressed so once is seen by these."""
@@ -45,7 +49,7 @@ class Cell:
 
     def __init__(self, seed: int) -> None:
         self.draw, self.kept, self.told = Random(seed), dict[str, Any](), list[str]()
-        control = settings(lease_s=LEASE_S, lease_action=self.draw.choice((LeaseAction.FAULT, LeaseAction.HOLD)))
+        control = settings(lease_s=LEASE_S, lease_action=self.draw.choice(tuple(LeaseAction)))
         self.control = replace(control, defaults=Defaults(force_ramp_n_per_s=self.draw.choice((5.0, 30.0, 200.0))))
         self.masters = {peer: Master(self.draw) for peer in MASTERS}
         self.begin(None)
@@ -73,9 +77,7 @@ class Cell:
 
     def happen(self) -> None:
         draw, rig, (peer, master) = self.draw, self.rig, self.draw.choice(tuple(self.masters.items()))
-        name = draw.choice(
-            ("hang", "hang", "go on", "ask", "ask", "idle", "stop", "stop here", "reset", "5 N", "death", "restart")
-        )
+        name = draw.choice(HAPPENINGS)
         self.told.append(f"{rig.now():.2f} {peer.host} {name}")
         if name in ("hang", "go on"):
             master.hangs = name == "hang"
@@ -90,6 +92,10 @@ class Cell:
             rig.answer(0, 0, peer=PAGE)
         elif name == "reset":
             rig.answer(0, RESET, 0, 0, 0, draw.randrange(1, 65536), peer=PAGE)
+        elif name == "cell":
+            rig.is_cell_silent = not rig.is_cell_silent
+        elif name == "run here":
+            rig.controller.active_run.ask(CalibrationPlan())
         elif name == "5 N":
             rig.answer(1, 500, peer=PAGE)
         elif name in ("death", "restart") and draw.random() < 0.5:

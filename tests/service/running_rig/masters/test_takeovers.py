@@ -251,7 +251,7 @@ def test_nobody_takes_over_by_a_command_that_has_waited_in_a_pile() -> None:
     assert refused is not None and refused.reason is RefusalReason.NOT_READY
     rig.run(2.0 * LEASE_S)
     assert rig.state is State.HOLDING and rig.bank.owner == OWNER.host
-    assert rig.answer(0, ControlBit.ENABLE | ControlBit.TAKE_OWNERSHIP, 500, peer=Peer("10.0.0.9")) is None
+    assert rig.answer(0, ControlBit.ENABLE | ControlBit.TAKE_OWNERSHIP, 500, 0, 0, 9, peer=Peer("10.0.0.9")) is None
     assert rig.bank.owner == "10.0.0.9"
 
 
