@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from gateway.catalogue.all_effects import BY_NAME
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.diagnosis import Options, Verdict, diagnose
+from gateway.diagnosis.experiments.identifiability import _why
 from gateway.diagnosis.verdict import _decide_verdict
 from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
 
@@ -38,3 +39,12 @@ def test_the_figures_of_an_answer_agree_with_each_other(share: float, creep_s: f
     for name, estimate in cause.parameters.items():
         low, high = estimate.ci95
         assert known[name].low <= low <= estimate.value <= high <= known[name].high, "there is no time below 0"
+    direct = {effect.name for effect in EFFECTS if effect.direct}
+    assert not direct & {each.name for each in answer.not_identifiable}, "the readings themselves would tell"
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, "100 %"), (0.03, "97 %"), (0.06, "within the noise")])
+def test_what_the_base_model_absorbs_is_told_by_how_much(share: float, told: str) -> None:
+    effect = BY_NAME["creep"]
+    said = _why(effect, frozenset({"command_v"}), 400.0, share)
+    assert told in said and effect.excitation in said

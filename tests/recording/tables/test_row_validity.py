@@ -32,6 +32,7 @@ def quality(*counts: tuple[float, int]) -> np.ndarray:
         (quality((192.0, 60), (216.0, 15), (24.0, 25)), False, 75, "25 rows are not judged: quality is below 192"),
         (quality((192.0, 70), (64.0, 30)), False, 70, "30 rows are not judged: quality is below 192"),
         (quality((100.0, 60), (90.0, 40)), False, 100, "what quality means by a good reading is not clear"),
+        (quality((192.0, 60), (300.0, 40)), False, 100, "what quality means by a good reading is not clear"),
         (quality((0.0, 60), (1.0, 30), (2.0, 10)), False, 90, "10 rows are not judged: overload or unknown"),
         (quality((0.0, 50), (1.0, 50)), False, 100, ""),
         (quality((0.0, 98), (np.nan, 2)), True, 98, "2 rows are not judged: overload or unknown"),
