@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gateway.diagnosis.search.hints import _mains_hz, _pitches_mm, lines_hz
+from gateway.diagnosis.search.hints import _mains_hz, _pitches_mm, _positions, lines_hz
 
 RATE_HZ, DURATION_S = 200.0, 40.0
 
@@ -51,3 +51,13 @@ def test_the_pitch_of_what_repeats_along_the_way_is_in_millimetres() -> None:
     white = np.sin(2.0 * np.pi * position_mm / 5.0) + np.random.default_rng(4).normal(0.0, 0.3, position_mm.size)
     assert _pitches_mm(white, position_mm)[0] == pytest.approx(5.0, rel=0.03)
     assert _pitches_mm(white, np.full(position_mm.size, 20.0)) == (), "who stands still sees no pitch"
+
+
+def test_positions_are_told_in_millimetres_and_are_unknown_where_nobody_has_measured_them() -> None:
+    bench = bench_of(RATE_HZ, RATE_HZ)
+    bench.columns = lambda: frozenset({"position_mm"})
+    bench.measurements[0].position_m, bench.measurements[1].position_m = np.full(8000, 0.0215), None
+    for channel, recording in zip(bench.channels, (0, 1), strict=True):
+        channel.recording = recording
+    found = _positions(bench)
+    assert found is not None and np.allclose(found[:8000], 21.5) and np.isnan(found[8000:]).all()
