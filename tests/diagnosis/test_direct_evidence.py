@@ -1,4 +1,4 @@
-"""Spikes: what is counted as one, what of them is told, and what is none."""
+"""Spikes and coarse counts: what is counted as one, what of them is told, and what is none."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gateway.catalogue.sensing import OUTLIER, OUTLIER_SHARE
-from gateway.diagnosis.search.direct_evidence import FEWEST_SPIKES, find_outliers
+from gateway.diagnosis.search.direct_evidence import FEWEST_SPIKES, find_outliers, find_quantisation
 
 ROWS, NOISE_N = 4000, 0.1
 
@@ -52,3 +52,34 @@ def test_a_row_that_is_no_witness_is_no_spike() -> None:
 )
 def test_a_few_one_count_and_what_noise_may_do_are_no_finding(spikes_n: list[float], quantum_n: float) -> None:
     assert find_outliers(bench_of(np.ones(ROWS, dtype=bool)), residual_of(spikes_n), quantum_n) is None
+
+
+def readings(quantum_n: float, noise_n: float = 0.1) -> np.ndarray:
+    force_n = 20.0 + 5.0 * np.sin(np.arange(ROWS) / 60.0) + np.random.default_rng(6).normal(0.0, noise_n, ROWS)
+    return np.round(force_n / quantum_n) * quantum_n if quantum_n else force_n
+
+
+def bench_with(*forces_n: np.ndarray) -> Any:
+    usable = np.ones(ROWS, dtype=bool)
+    bench = bench_of(usable)
+    bench.measurements = [SimpleNamespace(force_n=force_n, usable=usable) for force_n in forces_n]
+    return bench
+
+
+NOISE = np.random.default_rng(7).normal(0.0, 0.1, ROWS)
+
+
+@pytest.mark.parametrize(("known_n", "is_found"), [(0.0, True), (0.05, True), (0.2, False), (0.3, False)])
+def test_steps_that_are_known_are_no_finding_and_coarser_ones_are(known_n: float, is_found: bool) -> None:
+    found = find_quantisation(bench_with(readings(0.2)), NOISE, known_n)
+    assert (found is not None) == is_found
+    if found is not None:
+        assert found.values[0][1] == pytest.approx(0.2, rel=1.0e-6) and found.after_n < found.before_n
+
+
+def test_levels_that_lie_on_no_lattice_are_no_steps_of_a_converter() -> None:
+    levels = np.sort(np.random.default_rng(8).uniform(10.0, 30.0, 60))
+    found_n = levels[np.argmin(np.abs(readings(0.0)[:, None] - levels), axis=1)]
+    assert find_quantisation(bench_with(found_n), NOISE, 0.0) is None
+    fine = bench_with(readings(0.2), readings(0.0))
+    assert find_quantisation(fine, NOISE, 0.0) is None, "one of two recordings has none"
