@@ -76,6 +76,14 @@ def test_what_is_right_is_left_alone_and_a_foreign_machine_may_be_of_another_siz
     assert find_suspects([quiet], MACHINE, is_own=True) == ()
 
 
+def test_a_recording_of_hours_is_known_by_its_first_minutes() -> None:
+    time_s = times_s(150.0, 100.0)
+    volts = command_v(time_s)
+    played_n = Replay(Drive(time_s=time_s, command_v=volts)).run([MACHINE]).reading_n[0]
+    assert only(measurement(time_s, volts, played_n / 9.80665, {})) == (UNIT, "force_n", "kgf")
+    assert find_suspects([measurement(time_s, volts, played_n, {})], MACHINE, is_own=True) == ()
+
+
 def test_only_the_rig_s_own_plant_or_a_number_beyond_any_makes_a_unit_sure() -> None:
     """The machine may be of another size: of what is asked only, causes are looked for all the same."""
     pounds = replace(COMMANDED, force_n=written_in("lbf", "force", "n", FORCE_N))
