@@ -1,6 +1,7 @@
 """What README and the pages beside the rooms have from the code is what the code says, and what they name is there."""
 
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -92,3 +93,19 @@ def headings(page: Path) -> set[str]:
 )
 def test_every_file_that_readme_names_exists(path):
     assert (ROOT / path).exists()
+
+
+@pytest.mark.parametrize("places", [0, 1, 2])
+def test_a_part_is_written_where_it_is_once_and_nowhere_else(tmp_path: Path, places: int) -> None:
+    pages = [tmp_path / f"{number}.md" for number in range(3)]
+    for number, page in enumerate(pages):
+        page.write_text(f"<!-- {'map' if number < places else 'other'} -->\nold\n<!-- end -->\nbelow\n")
+    replace_part = runpy.run_path(str(ROOT / "tools" / "readme"))["replace_part"]
+    replace_part.__globals__["PAGES"] = pages
+    if places == 1:
+        replace_part("map", "new\n\n")
+    else:
+        with pytest.raises(SystemExit, match=f"{places} places for map"):
+            replace_part("map", "new")
+    assert [page.read_text().splitlines()[1] for page in pages] == ["new" if places == 1 else "old", "old", "old"]
+    assert sorted(tmp_path.iterdir()) == pages

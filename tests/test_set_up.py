@@ -67,6 +67,9 @@ def test_a_set_up_that_is_interrupted_leaves_no_stamp_and_is_finished_by_the_nex
     assert [word for line in asked for word in ("venv", "-r", "compileall", "-e") if f" {word} " in line] == [
         "venv", "-r", "-r", "compileall", "-e",
     ]  # fmt: skip
+    assert all("--require-hashes" in line for line in asked if " -r " in line), (
+        "what a mirror gives is not ours to trust"
+    )
 
 
 def test_a_broken_environment_is_made_anew_and_a_sound_one_kept(set_up: Any, monkeypatch: pytest.MonkeyPatch) -> None:

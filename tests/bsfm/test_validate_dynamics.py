@@ -7,6 +7,7 @@ import pytest
 from gateway.bsfm import CoefficientReason, validate_coefficients
 from gateway.bsfm.exact_polynomials import place_negative, place_not_positive
 from gateway.bsfm.model import Response
+from gateway.bsfm.slip.slip_stops import STOPS_MAX
 from tests.bsfm.test_validate_coefficients import GOOD, LIMITS
 
 STOPS, RADIUS, SHARE, STIFF = (CoefficientReason(number) for number in (11, 12, 13, 14))
@@ -87,6 +88,7 @@ def test_a_fault_has_its_number_its_reason_and_its_sentence(change, index, reaso
         response(second_lag_s=0.02, damping=1.0),
         response(dead_time_s=1.0, lag_s=2.0, second_lag_s=2.0),
         response(dead_time_s=0.0),
+        stops(tuple(0.5 + 0.1 * k for k in range(STOPS_MAX)), (1.0 / STOPS_MAX,) * STOPS_MAX),
         {"x1_v": 10.0, "blend_span_n": 0.0},
         {"blend_span_n": 100.0},
     ],

@@ -35,6 +35,29 @@ def test_a_force_below_0_is_not_sent(client: Any, gateway: GatewayAtHand) -> Non
     assert "0.00 .. 327.67" in client.text
 
 
+COUNTERS: dict[str, Any] = {
+    "rapid": lambda client, number: client.set(nHeartbeat=number, nTransaction=number),
+    "urscript": lambda client, number: client.set(fg_heartbeat=number, fg_transaction=number),
+    "python": lambda client, number: vars(client.client).update(heartbeat=number, transaction=number),
+}
+"""Of the languages whose numbers have no width of 16 bits of their own."""
+
+
+@pytest.mark.parametrize("language", COUNTERS)
+def test_a_force_is_held_on_when_the_numbers_of_its_requests_have_gone_round(
+    language: str, gateway: GatewayAtHand
+) -> None:
+    """At 20 ms a request they do so every 22 minutes: a robot that lost its gateway then would not be understood."""
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    client.enable(12.0)
+    cycles(client)
+    before = len(gateway.beats)
+    COUNTERS[language](client, 0xFFFF - 3)
+    cycles(client, 8)
+    assert gateway.beats[before:] == [0xFFFD, 0xFFFE, 0xFFFF, 0, 1, 2, 3, 4]
+    assert client.enabled and not client.ended and commands(gateway) == [command(1, 1200)]
+
+
 @pytest.mark.parametrize(
     "place", [pytest.param(1, id="transaction"), pytest.param(2, id="protocol"), pytest.param(6, id="unit")]
 )

@@ -58,6 +58,15 @@ def test_a_modbus_relay_that_answers_otherwise_is_quoted_and_its_late_answers_ar
     assert host.said == "", "another unit's"
 
 
+def test_a_valve_that_answers_in_other_words_is_quoted_and_what_is_no_text_is_not() -> None:
+    host, wrong = ValveHost(load_device("mcu-valve")), ("ERR COIL", "'ERR COIL'")
+    for body, said in (wrong, ("\x81\x02", ""), wrong):
+        host.request(PULL)
+        host.receive(f"{body}\n".encode("latin-1"))
+        assert host.said == said
+        host.forget()
+
+
 @pytest.mark.parametrize("name", VALVES)
 def test_an_answer_that_comes_twice_or_behind_a_lost_port_answers_nothing(name: str) -> None:
     host, device = ValveHost(load_device(name)), ValveDevice(load_device(name))

@@ -69,7 +69,7 @@ class HandTransport:
     ended: str = ""
     high_bytes: int = 0
     connection: Any = None
-    options: list[int] = field(default_factory=list)
+    options: list[tuple[int, int]] = field(default_factory=list)
 
     def get_extra_info(self, name: str, _default: Any = None) -> Any:
         return {"peername": (self.host, self.port), "socket": self}.get(name)
@@ -77,8 +77,8 @@ class HandTransport:
     def fileno(self) -> int:
         return -1  # how much waits nobody knows
 
-    def setsockopt(self, _level: int, option: int, _value: int) -> None:
-        self.options.append(option)
+    def setsockopt(self, level: int, option: int, _value: int) -> None:
+        self.options.append((level, option))
 
     def set_write_buffer_limits(self, high: int) -> None:
         self.high_bytes = high

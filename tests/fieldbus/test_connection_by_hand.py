@@ -78,7 +78,7 @@ def test_half_a_request_is_acknowledged_at_once_and_a_whole_one_by_its_answer(st
     deliver(connection, far, framed(READ) * 2)
     assert far.options == []
     deliver(connection, far, framed(READ)[:1])
-    assert far.options == [socket.TCP_QUICKACK]
+    assert far.options == [(socket.IPPROTO_TCP, socket.TCP_QUICKACK)]
     deliver(connection, far, framed(READ)[1:])
     assert answered(far) == [1, 1, 1] and len(far.options) == 1
 

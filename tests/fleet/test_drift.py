@@ -62,6 +62,13 @@ def test_a_day_of_more_recordings_has_no_more_of_a_cause() -> None:
     assert [(one.cause, one.cause_n) for one in find_drifts(rows)] == [("leak", pytest.approx(0.7))]
 
 
+def test_a_cause_that_shrinks_is_not_why_the_error_grows() -> None:
+    rows = [row("a", day, 0.3 + 0.1 * day, ("leak", 0.9 - 0.1 * day), ("creep", 0.3)) for day in range(8)]
+    (cell,) = find_drifts(rows)
+    assert cell.drifts and cell.change_n == pytest.approx(0.7)
+    assert (cell.cause, cell.cause_n, cell.group) == ("", 0.0, ()), "nobody has said what it is"
+
+
 def test_a_trend_that_nobody_would_mind_is_none() -> None:
     rows = [row("a", day, 0.3 + 0.001 * day) for day in range(10)]
     (cell,) = find_drifts(rows)

@@ -171,7 +171,7 @@ def test_other_encapsulated_interfaces_are_not_served() -> None:
     assert refusal("2b 0d") == 1, "the function comes before the shape"
 
 
-@pytest.mark.parametrize("sub_function", [1, 2, 4, 10, 20, 255, 0xFFFF])
+@pytest.mark.parametrize("sub_function", [1, 2, 4, 10, 20, 255, 0x0100, 0xFFFF])
 def test_other_diagnostic_sub_functions_are_not_served(sub_function: int) -> None:
     """6.8: "sub-function code supported: no" is exception 01."""
     assert refusal(f"08 {sub_function:04x} 0000") == 1

@@ -40,6 +40,14 @@ def test_more_seeds_make_a_narrower_interval() -> None:
     assert many.high - many.low < 0.5 * (few.high - few.low)
 
 
+def test_of_many_seeds_the_interval_is_that_of_95_percent() -> None:
+    """1.96 standard errors of the mean to each side: of 90 % it were 1.64."""
+    ratios = np.random.default_rng(5).lognormal(0.0, 0.3, 900)
+    found, error = interval(ratios), float(np.std(np.log(ratios))) / 30.0
+    wide = np.log([found.high / found.mean, found.mean / found.low]) / error
+    assert wide == pytest.approx([1.96, 1.96], abs=0.12)
+
+
 def test_a_goal_is_met_only_by_the_whole_interval() -> None:
     def comparison(ratios: list[float]) -> Comparison:
         return compare_scores("error", "N", {"bsfm": np.ones(4), "ours": np.array(ratios)}, goal=0.5)

@@ -1,6 +1,7 @@
 """Laws of the reproduction's rig: copies, noise, the ladder's groups, and what the regulator allows."""
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,9 +12,11 @@ from paper.experiments.laws import LAW_NAMES, Ours, Switched, law
 from paper.experiments.limit import Fastest
 from paper.experiments.rigs import copy_of, lift_pad, paper_plant, rig_lanes
 from paper.experiments.trials import Lane
+from paper.verdicts import validation_and_steps
 
 from gateway.bsfm.ladder.measured_ladder import ladder_plan
 from gateway.twin.experiment import staircase
+from gateway.twin.regulator import RegulatorState
 
 
 @cache
@@ -120,3 +123,14 @@ def test_conditioning_leaves_the_friction_on_the_falling_branch() -> None:
     rig = rig_lanes([paper_plant()], [0], 1)
     condition(rig.twin)
     assert rigs.paper_plant().friction.coulomb_n * 0.5 < float(rig.twin.force_n[0]) < 2.0
+
+
+def test_a_steady_climb_comes_as_late_as_the_report_says() -> None:
+    """Whatever stands on the way delays a ramp by its own time, and all of them by the sum."""
+    plain = replace(paper_plant().regulator, dead_band_pa=0.0, hysteresis_pa=0.0, command_step_v=0.0)
+    moved, climb_v_per_s = RegulatorState(plain, 1.0e-3), 0.5
+    for step in range(8000):
+        moved.command(climb_v_per_s * step * 1.0e-3)
+        moved.step()
+    late_v = climb_v_per_s * 8.0 - moved.pressure_pa * plain.full_scale_v / plain.full_scale_pa
+    assert abs(late_v / climb_v_per_s - validation_and_steps.lag_s()) < 2.0e-3

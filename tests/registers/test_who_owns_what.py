@@ -8,7 +8,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
-from gateway.registers.writes.held_starts import HeldRuns
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
 from gateway.registers.writes.ownership import (
     LARGEST_SERIAL_PLACE,
     NOT_IPV4,
@@ -269,11 +269,25 @@ def test_whoever_keeps_what_is_held_is_told_of_each_end_and_the_oldest_of_too_ma
     told: list[dict[str, int]] = []
     held = HeldRuns()
     held.on_change = told.append
-    for bits in (TEST, TEST, 0, 0):
+    for bits, times in ((TEST, 1), (TEST, 1), (0, 2), (0, 2)):
         held.keep("a", bits)
+        assert len(told) == times, "of what is as before nobody hears"
     assert told == [{"a": TEST}, {}]
     for number in range(64):
         held.keep(f"10.0.0.{number}", TEST)
     held.keep("10.0.0.0", TEST)  # it is there again, as each of its cycles says
     held.keep("new", TEST)
     assert [held.of(host) for host in ("10.0.0.0", "10.0.0.1", "10.0.0.2", "new")] == [TEST, 0, TEST, TEST]
+
+
+def test_a_master_is_lost_once_with_each_heartbeat_and_found_by_another_one() -> None:
+    told: list[dict[str, int]] = []
+    held = HeldEnables()
+    held.on_lost = told.append
+    for heartbeat, times in ((3, 1), (3, 1), (4, 2)):
+        held.note_lost("a", heartbeat)
+        assert len(told) == times
+    held.hear("a", 4)
+    assert held.knows("a"), "by its last frame, sent on and on"
+    held.hear("a", 5)
+    assert told == [{"a": 3}, {"a": 4}, {}] and not held.knows("a")

@@ -130,6 +130,23 @@ def test_the_first_good_recording_after_a_calibration_came_into_use_is_kept(tmp_
     assert kept is not None and kept.name == "0001.fgr"
 
 
+@pytest.mark.parametrize("zone", ["JST-9", "HST10"])
+def test_the_zone_of_the_machine_says_nothing_of_when_it_was_recorded(tmp_path, monkeypatch, zone):
+    """Hours east of Greenwich a recording would have begun before the calibration that it was made with came into use; hours
+    west one of before would be the reference."""
+    monkeypatch.setenv("TZ", zone)
+    time.tzset()
+    try:
+        use_calibration(tmp_path, 2)
+        path = record(tmp_path)
+        assert reference_recording._begin_s(read_header(path)) == pytest.approx(time.time() + 60.0, abs=10.0)
+        known = FirstGoodRecording(tmp_path).keep(time.time())
+        assert known is not None and known.name == path.name
+    finally:
+        monkeypatch.undo()
+        time.tzset()
+
+
 def test_recordings_of_another_calibration_are_not_read_through(tmp_path, monkeypatch):
     """Each was, once: days of recordings went through the memory of the watch."""
     record(tmp_path, calibration=1), record(tmp_path, calibration=3), record(tmp_path)

@@ -93,6 +93,17 @@ def test_a_time_limit_takes_what_is_short_and_names_what_is_left_out() -> None:
     assert [name for name, _ in plan.left_out] == ["creep", "clock-skew"]
 
 
+@pytest.mark.parametrize("longest_s", [0.0, 60.0, 150.0, 300.0, 600.0])
+def test_whatever_is_asked_besides_the_whole_plan_keeps_to_its_time(longest_s: float) -> None:
+    alone = [name for name, experiment in EXPERIMENTS.items() if experiment.is_alone]
+    plan = plan_for(("dead-band",), besides=alone, longest_s=longest_s)
+    assert plan.total_s <= max(longest_s, plan_for(("dead-band",)).total_s)
+    assert {*plan.experiment.shows, *(name for name, _ in plan.left_out)} == {*alone}
+    for name, _ in plan.left_out:
+        more_s = plan_for((*plan.experiment.shows, name)).total_s
+        assert more_s > longest_s, f"{name} would have had its time"
+
+
 def test_what_is_done_by_hand_meanwhile_stands_alone() -> None:
     plan = plan_for(("tilt-gravity", "creep", "valve-crosstalk"))
     assert plan.experiment.shows == ("creep",)

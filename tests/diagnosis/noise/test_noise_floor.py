@@ -5,6 +5,7 @@ import pytest
 
 from gateway.diagnosis import Options, diagnose
 from gateway.diagnosis.bench.bench import Bench, bench_of
+from gateway.diagnosis.noise import noise_floor
 from gateway.diagnosis.noise.noise_floor import find_floor, find_rests, replicate_floor_n, rest_floor
 from gateway.diagnosis.result import FloorSource
 from tests.diagnosis.begun_anywhere import coloured
@@ -79,3 +80,17 @@ def test_replicates_come_before_rests() -> None:
     assert replicate_floor_n(bench.measurements[0]) == pytest.approx(0.1, rel=0.05)
     found = find_floor(bench, white(7), None)
     assert found is not None and found.source is FloorSource.REPLICATES
+
+
+@pytest.mark.parametrize(("known_n", "floor_n"), [((0.1, 0.3), 0.3), ((0.3, 0.1), 0.3), ((0.1, None), None)])
+def test_replicates_prove_a_floor_for_all_recordings_only_where_each_of_them_has_some(
+    known_n: tuple[float | None, ...], floor_n: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And that of the noisiest: below it what the quieter ones leave open would be called a cause."""
+    moved = measurement(TIME_S, MOVING_V, 8.5 * MOVING_V + white(1), {})
+    bench, told = bench_of([moved, moved]), iter(known_n)
+    monkeypatch.setattr(noise_floor, "replicate_floor_n", lambda _: next(told))
+    found = find_floor(bench, np.concatenate([white(1), white(1)]), 0.7)
+    assert found is not None
+    expected = (floor_n, FloorSource.REPLICATES) if floor_n else (0.7, FloorSource.CALIBRATION)
+    assert (found.value_n, found.source) == expected

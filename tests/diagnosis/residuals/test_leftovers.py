@@ -114,6 +114,17 @@ def test_a_stretch_that_is_louder_is_told_with_its_time_and_both_levels() -> Non
     assert "from 12 to 16 s: 0.2" in found[0].shape and "against 0.1 N elsewhere" in found[0].shape
 
 
+@pytest.mark.parametrize("hertz", [6.1, 13.7])
+def test_a_line_that_comes_and_goes_is_told_in_hertz_in_each_recording(hertz: float) -> None:
+    """Its phase is another one each time: over the whole recording there is no such line."""
+    phase = np.repeat(np.random.default_rng(5).uniform(0.0, 6.0, 20), TIME_S.size // 20)
+    there = np.repeat([1.0, 0.0] * 10, TIME_S.size // 20)
+    line_n = 0.3 * there * np.sin(2.0 * np.pi * hertz * TIME_S + phase)
+    for residuals_n in ((line_n,), (np.zeros(TIME_S.size), line_n)):
+        found = [each for each in left(*residuals_n) if "wanders" in each.shape]
+        assert len(found) == 1 and found[0].frequency_hz == pytest.approx(hertz, rel=0.05)
+
+
 def test_the_file_of_several_is_named() -> None:
     line = 0.15 * np.sin(2.0 * np.pi * 7.3 * TIME_S)
     (one, *_) = left(np.zeros(TIME_S.size), line, np.zeros(TIME_S.size))

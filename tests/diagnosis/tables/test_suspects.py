@@ -76,6 +76,25 @@ def test_what_is_right_is_left_alone_and_a_foreign_machine_may_be_of_another_siz
     assert find_suspects([quiet], MACHINE, is_own=True) == ()
 
 
+def test_a_recording_of_hours_is_known_by_its_first_minutes() -> None:
+    time_s = times_s(150.0, 100.0)
+    volts = command_v(time_s)
+    played_n = Replay(Drive(time_s=time_s, command_v=volts)).run([MACHINE]).reading_n[0]
+    assert only(measurement(time_s, volts, played_n / 9.80665, {})) == (UNIT, "force_n", "kgf")
+    assert find_suspects([measurement(time_s, volts, played_n, {})], MACHINE, is_own=True) == ()
+
+
+def test_only_the_rig_s_own_plant_or_a_number_beyond_any_makes_a_unit_sure() -> None:
+    """The machine may be of another size: of what is asked only, causes are looked for all the same."""
+    pounds = replace(COMMANDED, force_n=written_in("lbf", "force", "n", FORCE_N))
+    millivolts = replace(COMMANDED, command_v=written_in("mv", "voltage", "v", VOLTS))
+    for wrong, beyond in ((pounds, False), (millivolts, True)):
+        for is_own in (True, False):
+            (one,) = find_suspects([wrong], MACHINE, is_own=is_own)
+            assert one.is_sure == (is_own or beyond)
+            assert ("of another size" in one.sentence) != one.is_sure
+
+
 def test_no_cause_is_looked_for_where_columns_are_wrong() -> None:
     wrong = replace(COMMANDED, force_n=FORCE_N / 9.80665)
     answer = diagnose([wrong], MACHINE, Options(is_own=True))

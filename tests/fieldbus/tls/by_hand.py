@@ -62,14 +62,19 @@ class Face:
     clock: HandClock = field(default_factory=HandClock)
     bank: NotingBank = field(default_factory=NotingBank)
     log: list[str] = field(default_factory=list)
+    causes: list[str] = field(default_factory=list)
     closed: list[Peer] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         server, folder = ServerSettings(), self.folder
         files = TlsSettings(server, folder.crt("gateway"), folder.key("gateway"), folder.crt("ca"), frozenset())
-        log = LogLimiter(lambda cause, sentence: self.log.append(sentence))
+        log = LogLimiter(self._note)
         self.shared = ServerState(self.bank, server, self.clock, log, Peers(server, guarded=False), self.closed.append)
         self.handshakes = Handshakes(context_maker(files), frozenset((serial_of("thief"),)), self.now)
+
+    def _note(self, cause: str, sentence: str) -> None:
+        self.causes.append(cause)
+        self.log.append(sentence)
 
     def accept(self, host: str = "127.0.0.1") -> "Line":
         return Line(self, SocketInHand(host))

@@ -66,6 +66,7 @@ def test_who_changes_the_keys_without_end_is_cut(face: Face, folder: Folder, tmp
             break
     assert LONGEST_RECORD < sent < LONGEST_RECORD + 100 and line.socket.ended == "aborted"
     assert face.log == ["W232 monitor (127.0.0.1:40000): TLS without end, and hardly a byte of Modbus in it, closed"]
+    assert face.causes == ["framing"], "what else cannot be framed has its share of the log's lines, and no more"
     assert not face.shared.connections
 
 

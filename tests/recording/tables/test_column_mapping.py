@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
+from pyarrow import csv, parquet
 
-from gateway.recording import ColumnMapping, ColumnSource, RecordingError
+from gateway.recording import ColumnMapping, ColumnSource, RecordingError, read_table
 from gateway.recording.foreign.unit_names import unit_of
 from gateway.recording.tables.column_mapping import join_names, quantity_of, select_columns
 from gateway.recording.tables.column_names import CONTRACT, DERIVED
@@ -160,3 +162,20 @@ def test_the_longest_ending_is_the_unit() -> None:
 def test_what_the_twin_knows_of_its_surroundings_stands_in_the_contract_under_the_same_names() -> None:
     assert set(COLUMNS) <= set(CONTRACT)
     assert not set(DERIVED) & set(CONTRACT)
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_table_says_the_same_in_either_form_whatever_its_units(tmp_path: Path, suffix: str) -> None:
+    """Not a factor alone: a thermometer's zero is elsewhere, and so is a sensor's of 4 to 20 mA; and a sign may be turned."""
+    table = pa.table({"t": [0.0, 10.0], "f": [-1.0, -2.0], "p": [4.0, 20.0], "oil": [300.0, 310.0], "c": [32.0, 50.0]})
+    path = tmp_path / f"table.{suffix}"
+    (csv.write_csv if suffix == "csv" else parquet.write_table)(table, path)
+    text = "time_s=t:ms,force_n=f:-n,pressure_kpa=p:4..20=0..10bar,temperature_c=oil:k,cooling_c=c:-f"
+    found = read_table(path, ColumnMapping.parse(text)).columns
+    assert {name: values.tolist() for name, values in found.items()} == {
+        "time_s": pytest.approx([0.0, 0.01]),
+        "force_n": [1.0, 2.0],
+        "pressure_kpa": pytest.approx([0.0, 1000.0]),
+        "temperature_c": pytest.approx([26.85, 36.85]),
+        "cooling_c": pytest.approx([0.0, -10.0]),
+    }

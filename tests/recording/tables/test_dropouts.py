@@ -60,6 +60,26 @@ def test_a_temperature_or_a_pressure_that_is_none_is_missing(name: str) -> None:
     assert not any("are below" in note for note in turned.notes), "all of them: that is another thing"
 
 
+@pytest.mark.parametrize(
+    ("name", "usual", "seldom"),
+    [
+        ("supply_kpa", 700.0, 1500.0),
+        ("pressure_kpa", 300.0, 1500.0),
+        ("pressure_kpa", 300.0, -90.0),
+        ("temperature_c", 20.0, 900.0),
+    ],
+)
+def test_what_a_machine_may_have_now_and_then_is_no_dropout(name: str, usual: float, seldom: float) -> None:
+    """A line of 16 bar, a vacuum, a hot workpiece: they are what a force may depend on."""
+    values = usual + np.sin(TIME_S)
+    values[::40] = seldom
+    table = {"time_s": TIME_S, "command_v": VOLTS, "force_n": FORCE_N, name: values}
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    kept = found.covariates.get(name) if found.pressure_pa is None else found.pressure_pa / 1000.0
+    np.testing.assert_allclose(kept, values)
+    assert not any(f"values of {name}" in note for note in found.notes)
+
+
 def test_what_is_clean_stays_as_it_is() -> None:
     for clean in (FORCE_N, np.zeros(TIME_S.size), np.full(TIME_S.size, np.nan), np.where(VOLTS > 2.0, 10.0, 0.0)):
         assert dropped(clean) == []

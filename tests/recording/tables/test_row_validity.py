@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gateway.recording import Recording, RecordingError
+from gateway.recording import Recording, RecordingError, read_table
 from gateway.recording.foreign.time_stamps import parse_stamp, seconds_from_stamps
+from gateway.recording.measurement import measurement_of
 from gateway.recording.tables.row_validity import Floats, flag_clipped, flag_repeated, valid_by_quality
 from gateway.recording.tables.time_axis import check_time_axis
 from tests.recording.test_measurement_of import TIME_S, N, columns, measured
@@ -31,6 +32,7 @@ def quality(*counts: tuple[float, int]) -> np.ndarray:
         (quality((192.0, 60), (216.0, 15), (24.0, 25)), False, 75, "25 rows are not judged: quality is below 192"),
         (quality((192.0, 70), (64.0, 30)), False, 70, "30 rows are not judged: quality is below 192"),
         (quality((100.0, 60), (90.0, 40)), False, 100, "what quality means by a good reading is not clear"),
+        (quality((192.0, 60), (300.0, 40)), False, 100, "what quality means by a good reading is not clear"),
         (quality((0.0, 60), (1.0, 30), (2.0, 10)), False, 90, "10 rows are not judged: overload or unknown"),
         (quality((0.0, 50), (1.0, 50)), False, 100, ""),
         (quality((0.0, 98), (np.nan, 2)), True, 98, "2 rows are not judged: overload or unknown"),
@@ -223,6 +225,19 @@ def test_what_a_column_of_quality_calls_good_may_still_be_no_witness() -> None:
     force_n[7] = np.nan
     found = measured(time_s=TIME_S + gap_s, force_n=force_n, quality=np.zeros(N))
     assert np.flatnonzero(~found.usable).tolist() == [7, *range(400, 500)]
+
+
+@pytest.mark.parametrize("good", ["ok", "Good", "VALID"])
+@pytest.mark.parametrize("bad", ["bad", "Invalid", "OVERLOAD"])
+def test_a_reading_that_its_logger_calls_bad_in_whatever_word_is_no_witness(
+    tmp_path: Path, good: str, bad: str
+) -> None:
+    """Half of them are: a rare value would be left out whatever it is called."""
+    words = [bad if row % 2 else good for row in range(N)]
+    rows = zip(TIME_S, columns()["command_v"], columns()["force_n"], words, strict=True)
+    table = tmp_path / "told.csv"
+    table.write_text("time_s,command_v,force_n,quality\n" + "\n".join(",".join(map(str, row)) for row in rows))
+    assert measurement_of(read_table(table)).usable.tolist() == [word == good for word in words]
 
 
 def test_a_position_with_a_hole_is_in_metres_too() -> None:

@@ -53,6 +53,19 @@ def test_a_takeover_that_chooses_the_mode_presses_no_voltage_that_another_has_le
     assert (bank.command.mode, bank.command.voltage_setpoint_v) == (Mode.VOLTAGE, 0.0)
 
 
+@pytest.mark.parametrize(("host", "asked_n"), [("10.0.0.1", 20.0), ("10.0.0.2", 8.0)])
+def test_who_beats_where_a_lost_master_s_force_is_held_goes_on_with_that_and_no_more(
+    make_bank, master_of, host, asked_n
+):
+    """It has asked for nothing: 8 N are held of the 20 N that the lost one wanted, and wants still where it beats itself."""
+    bank = make_bank()
+    master_of(bank, "10.0.0.1").write(0, ENABLE, 2000)
+    bank.publish(Status(State.HOLDING, PUSHES, force_accepted_n=8.0))
+    bank.release_owner()
+    master_of(bank, host).write(4, 7)
+    assert (bank.owner, bank.command.force_setpoint_n) == (host, asked_n)
+
+
 def test_a_stop_that_has_waited_in_a_pile_stops_and_its_heartbeat_is_none(bank, master, commands):
     """A reset wants a beat of behind the fault: one of a pile may be of long before."""
     master.write(0, ENABLE, 1200)

@@ -113,3 +113,33 @@ def test_a_name_goes_on_behind_an_underscore_on_a_telephone(page, chromium) -> N
     browser.route("**/events?*", lambda route: route.abort())
     window: Any = open_tab(browser, page.address, "wiring")
     assert window.evaluate(FOLDED, register_table(demo(), 5020)) == ["voltage_", "setpoint"]
+
+
+LINES = """async ({ map, words }) => {
+  const { makeRegisters } = await import("/static/live/registers.js");
+  const said = [];
+  const table = makeRegisters({ get: async () => map, say: (text) => said.push(text) });
+  await new Promise((done) => setTimeout(done));
+  await table.state({ words: { command: [], status: words }, writers: {} });
+  const told = {};
+  for (const row of table.element.querySelectorAll("tbody tr")) {
+    const before = said.length;
+    row.querySelector("button")?.click();
+    while (said.length === before) await new Promise((done) => setTimeout(done, 5));
+    told[row.children[2].textContent] = [row.children[4].textContent, said.at(-1).replace("Copied: ", "")];
+  }
+  return told;
+}"""
+
+
+def test_of_another_unit_each_line_to_copy_says_which_and_reads_both_words_of_a_long_number(page, chromium) -> None:
+    """Without its own unit a gateway behind a bridge is silent, and of a long number one half is any number."""
+    rig = demo()
+    block = rig.register_map.block("status")
+    status = [0] * block.words
+    status[rig.register_map.find("force_measured").address - block.first] = 0x8000
+    window: Any = open_tab(chromium, page.address, "wiring")
+    found = window.evaluate(LINES, {"map": register_table(rig, 5020) | {"unit": 17}, "words": status})
+    assert found["owner_ip"][1] == "mbpoll -1 -p 5020 -a 17 -t 4:int -B -r 117 127.0.0.1"
+    assert found["force_measured"] == ["not known", "mbpoll -1 -p 5020 -a 17 -r 103 127.0.0.1"]
+    window.close()

@@ -1,0 +1,50 @@
+"""What an answer may call itself, and what its figures may never say of each other."""
+
+from itertools import product
+from typing import Any
+
+import pytest
+
+from gateway.catalogue.all_effects import BY_NAME, EFFECTS
+from gateway.diagnosis import Options, Verdict, diagnose
+from gateway.diagnosis.experiments.identifiability import _why
+from gateway.diagnosis.verdict import _decide_verdict
+from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
+
+THERE: Any = ("something",)
+TRUE_OR_NOT = (False, True)
+
+
+@pytest.mark.parametrize(("caused", "left", "reached", "unexplained"), list(product(TRUE_OR_NOT, repeat=4)))
+def test_a_verdict_never_says_more_than_is_known(caused: bool, left: bool, reached: bool, unexplained: bool) -> None:
+    found = _decide_verdict(THERE * caused, THERE * left, reached=reached, unexplained=unexplained)
+    assert (found in (Verdict.PARTIAL, Verdict.CONFIRMED)) == caused
+    assert (found is Verdict.CONFIRMED) == (caused and reached and not left), "confirmed beside what is left over"
+    assert (found is Verdict.NOTHING_FOUND) == (not caused and not left and not unexplained), "an error without a cause"
+
+
+@pytest.mark.parametrize(
+    ("share", "creep_s", "given_n"),
+    [
+        pytest.param(0.03, 4.0, 1.06 * NOISE_N, id="a floor above what is left"),
+        pytest.param(0.01, 20.0, None, id="a time that hardly shows"),
+    ],
+)
+def test_the_figures_of_an_answer_agree_with_each_other(share: float, creep_s: float, given_n: float | None) -> None:
+    hidden = {"contact.creep_share": share, "contact.creep_s": creep_s}
+    answer = diagnose([recorded(hidden, seed=2, time_s=times_s(24.0, 100.0))], MACHINE, Options(noise_floor_n=given_n))
+    assert answer.baseline.noise_floor_n <= min(answer.extended.held_out_rms_n, answer.baseline.rms_n)
+    (cause,) = answer.causes
+    known = {one.name: one for form in BY_NAME[cause.name].forms for one in form.parameters}
+    for name, estimate in cause.parameters.items():
+        low, high = estimate.ci95
+        assert known[name].low <= low <= estimate.value <= high <= known[name].high, "there is no time below 0"
+    direct = {effect.name for effect in EFFECTS if effect.direct}
+    assert not direct & {each.name for each in answer.not_identifiable}, "the readings themselves would tell"
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.0, "100 %"), (0.03, "97 %"), (0.06, "within the noise")])
+def test_what_the_base_model_absorbs_is_told_by_how_much(share: float, told: str) -> None:
+    effect = BY_NAME["creep"]
+    said = _why(effect, frozenset({"command_v"}), 400.0, share)
+    assert told in said and effect.excitation in said

@@ -1,0 +1,148 @@
+"""The figures of the live view: of which samples they are, at which time, and how they are counted."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gateway.live.live_state import LiveAlarm, LiveLine, LiveLoop, LiveState
+from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
+
+SAMPLES = """async () => {
+  const { samples } = await import("/static/live/samples.js");
+  const made = () => new samples.constructor();
+  const rows = (from_s, to_s, force_n) => {
+    const time_s = [];
+    for (let at = from_s; at < to_s; at += 1) time_s.push(at);
+    return { time_s, force_n: time_s.map(() => force_n) };
+  };
+  const told = {};
+  const one = made();
+  told.empty = one.isFresh;
+  one.append(rows(100, 103, 5));
+  one.align({ time_unix_s: 1000, clock_s: 102.5 });
+  told.fresh = [one.isFresh, one.now_s, one.offset_s];
+  one.align({ time_unix_s: 1004, clock_s: 106.5 });
+  told.old = [one.isFresh, one.now_s, one.offset_s];
+  one.append(rows(101, 105, 6));
+  told.joined = [one.columns.time_s, one.columns.force_n];
+  one.append(rows(3, 5, 7));
+  told.other = [one.columns.time_s, one.columns.force_n];
+  const long = made();
+  for (let at = 0; at < 2000; at += 10) long.append(rows(at, at + 10, at));
+  told.long = [long.time.length, long.columns.force_n.length, long.newest_s, long.time[0] > 1200];
+  for (let at = 0; at < 100; at++) long.mark({ time: new Date(1000 * (2000 + at)).toISOString(), code: `W${at}` });
+  long.align({ time_unix_s: 2100, clock_s: 50 });
+  told.marks = [long.marks.length, long.marks.at(-1).code, long.marks.at(-1).unix_s - long.offset_s];
+  return told;
+}"""
+
+HEALTH = """async (state) => {
+  const { makeHealth } = await import("/static/live/health.js");
+  const health = makeHealth();
+  health.state(state);
+  const rows = Array.from(health.element.querySelectorAll("tr"), (row) => Array.from(row.children, (cell) => cell.textContent));
+  return Object.fromEntries(rows);
+}"""
+
+AGES = """async (state) => {
+  const { makeAlarms } = await import("/static/live/health.js");
+  const alarms = makeAlarms({ on: () => {}, post: async () => ({}), say: () => {} });
+  alarms.state(state);
+  const said = (item) => [item.className, ...["strong", ".age"].map((part) => item.querySelector(part).textContent)];
+  return Array.from(alarms.element.querySelectorAll("li.fault, li.warning"), said);
+}"""
+
+ERRORS = """async (columns) => {
+  const { makeError } = await import("/static/live/error.js");
+  const error = makeError({ columns });
+  document.body.prepend(error.element);
+  error.draw();
+  error.state();
+  return error.element.querySelector("p.small").textContent;
+}"""
+
+TREND = """async ({ columns, tolerance_n }) => {
+  const { Plot } = await import("/static/live/plots.js");
+  const { makeTrend } = await import("/static/live/trend.js");
+  let plot = null;
+  const fit = Plot.prototype.fit;
+  Plot.prototype.fit = function () { fit.call(this); plot = this; };
+  const trend = makeTrend({ columns, now_s: 2, offset_s: 0, marks: [] });
+  document.body.prepend(trend.element);
+  trend.state({ limits: { tolerance_n }, force: { requested_n: 8 }, status: [] });
+  trend.draw();
+  return plot.chart.data.map((one) => Array.from(one));
+}"""
+
+
+@pytest.fixture
+def window(page: Any, chromium: Any) -> Any:
+    """A page to which nothing comes but what a test tells it."""
+    browser = chromium.new_context()
+    browser.route("**/events?*", lambda route: route.abort())
+    return open_tab(browser, page.address, "live")
+
+
+def state(**facts: Any) -> dict[str, Any]:
+    return LiveState(rig="demo", simulated=True, version="0", time_unix_s=1000.0, state="fault", **facts).to_json()
+
+
+def test_samples_are_of_this_machine_and_of_the_last_minute_and_say_when_they_are_old(window: Any) -> None:
+    told = window.evaluate(SAMPLES)
+    assert not told["empty"]
+    assert told["fresh"] == [True, 102.5, 897.5]
+    assert told["old"] == [False, 106.5, 897.5], "the clock goes on where no sample comes"
+    assert told["joined"] == [[100, 101, 102, 103, 104], [5, 5, 5, 6, 6]], "what overlaps is there once"
+    assert told["other"] == [[3, 4], [7, 7]], "behind a restart nothing of before is beside it"
+    assert told["long"][0] == told["long"][1] and told["long"][2:] == [1999, True]
+    assert told["marks"] == [60, "W99", 49], "the newest sixty, at the gateway's own time"
+
+
+def test_shares_and_times_of_lines_and_loop_are_counted_as_their_units_say(window: Any) -> None:
+    line = LiveLine(device="itv", asked=900, heard=600, garbled=200, age_s=0.2)
+    loop = LiveLoop(hz=100.0, ticks=2000, missed=10, late_p50_us=250, late_p99_us=12_400, step_us=1_500.0)
+    told = window.evaluate(HEALTH, state(output=line, load_cell=replace(line, device="cell", age_s=None), loop=loop))
+    assert told == {
+        "Loop": "100 Hz, 1.50 ms of work",
+        "Lateness": "half under 0.25 ms, 99 % under 12 ms",
+        "Missed ticks": "10 of 2 000 (0.500 %)",
+        "Output, itv": "answers; 600 heard, 200 garbled (25.00 %)",
+        "Load cell, cell": "never heard; 600 heard, 200 garbled (25.00 %)",
+    }
+    valve = window.evaluate(HEALTH, state(valve=replace(line, device="relay", age_s=5000.0)))
+    assert valve["Valve, relay"].startswith("silent for 83 min;")
+
+
+def test_each_alarm_says_how_long_it_stands_itself(window: Any) -> None:
+    fault = LiveAlarm(code="A311", title="one", cure="Look.", since_unix_s=990.0)
+    warning = replace(fault, code="A342", title="two", since_unix_s=900.0)
+    told = window.evaluate(AGES, state(faults=(fault,), warnings=(warning,)))
+    assert told == [["fault", "A311 one", "for 10 s"], ["warning", "A342 two", "for 1 min"]]
+
+
+def test_an_error_is_that_of_the_way_on_which_it_was_made_and_of_the_direction_that_pulls(window: Any) -> None:
+    """1 N too much while it climbs, 2 N while it falls; pulled, the force is measured negative and the setpoint is not."""
+    applied_n = [5.0 + 0.1 * k for k in range(40)] + [8.8 - 0.1 * k for k in range(40)]
+    columns = {
+        "applied_n": applied_n,
+        "force_n": [value + (1.0 if k < 40 else 2.0) for k, value in enumerate(applied_n)],
+        "state": [3.0] * 80,
+        "time_s": [10.0 + 0.05 * k for k in range(80)],
+        "pulling": [0.0] * 80,
+    }
+    said = "RMS 1.00 N rising, 2.00 N falling, last minute."
+    assert window.evaluate(ERRORS, columns) == said
+    pulled = columns | {"pulling": [1.0] * 80, "force_n": [-value for value in columns["force_n"]]}
+    assert window.evaluate(ERRORS, pulled) == said
+    assert window.evaluate(ERRORS, columns | {"state": [1.0] * 80}).startswith("No force was wanted")
+
+
+def test_the_band_lies_about_what_is_wanted_on_its_side_of_zero(window: Any) -> None:
+    columns = {
+        "time_s": [0.0, 1.0, 2.0], "force_n": [8.1, -8.2, 0.1],
+        "setpoint_n": [8.0, 8.0, 0.0], "pulling": [0.0, 1.0, 0.0],
+    }  # fmt: skip
+    _, low, high, measured, wanted = window.evaluate(TREND, {"columns": columns, "tolerance_n": 0.5})
+    assert (wanted, low, high) == ([8.0, -8.0, None], [7.5, -8.5, None], [8.5, -7.5, None])
+    assert measured == columns["force_n"]
