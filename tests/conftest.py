@@ -67,6 +67,7 @@ def keep_parsed_profiles() -> None:
         read = done_once(getattr(room, reader))
         for module in (room, assembly):
             setattr(module, reader, read)
+    assembly.read_served_registers = done_once(registers.read_served_registers)
     registers.read_map = done_once(registers.read_map)
 
 

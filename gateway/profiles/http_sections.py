@@ -19,7 +19,9 @@ from gateway.profiles.strict_yaml.typed import adapter
 from gateway.profiles.telemetry_sections import Mqtt
 
 _SECRETS: Final = ("token", "password")
-_ESCAPE: Final = "\\"  # a key in double quotes may be spelt by escapes: "to\u006ben"
+_SPELT: Final = re.compile(r"\\[xu\r\n\x85\u2028\u2029]", re.I)
+"""By what a key in double quotes may be hidden: an escape, "to\\u006ben", or the end of its line. The "\\r\\n" of a device's
+sentences spells nothing."""
 _COMMENT: Final = re.compile(r"(?:^|(?<=\s))#[^\n]*", re.M)
 _SAID: Final = re.compile(rf"(?:{'|'.join(_SECRETS)})[\"']?\s*[:=]\s*(\S.*)", re.I)
 _LEAST: Final = 8  # characters of a secret that is looked for in comments: a shorter one stands in any word
@@ -131,7 +133,7 @@ def without_secrets(text: str) -> str:
     """Return the text of a rig file with tokens and passwords blanked; it reads as before otherwise. Where a value ends YAML
     says: it may have spaces, commas and number signs in it, and go on in the next line. One in a comment, as of a former token,
     goes to the end of its line; a comment that has the present one goes as a whole."""
-    if not any(name in text.lower() for name in (*_SECRETS, _ESCAPE)):
+    if not (_SPELT.search(text) or any(name in text.lower() for name in _SECRETS)):
         return text
     document = yaml.compose(text, yaml.SafeLoader)
     nodes = list(_secret_nodes(document))

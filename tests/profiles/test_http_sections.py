@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import yaml
 
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen, without_secrets
@@ -83,6 +84,20 @@ def test_a_token_does_not_travel_with_the_rig_s_texts(key: str, tmp_path: Path) 
     assert without_secrets(f"brokers:\n- host: a\n- password: {TOKEN}\n").endswith(
         "- password: removed-from-this-copy\n"
     )
+
+
+def test_a_key_that_goes_on_in_the_next_line_hides_no_token() -> None:
+    for end in ("\n", "\r\n", "\r", "\x85", "\u2028"):
+        text = f'? "pass\\{end}  word"\n: {TOKEN}\n'
+        assert TOKEN in str(yaml.safe_load(text)["password"])
+        assert TOKEN not in without_secrets(text)
+
+
+def test_a_device_s_line_ends_are_not_taken_for_the_spelling_of_a_token(monkeypatch) -> None:
+    """Its file was read once more for them at each start, by the slower of both readers: as long as all the rest took."""
+    monkeypatch.setattr(yaml, "compose", lambda *_: pytest.fail("it is read once more"))
+    text = 'terminator: "\\r\\n"\nask: "SET {value:int}"\n'
+    assert without_secrets(text) == text
 
 
 @pytest.mark.parametrize(

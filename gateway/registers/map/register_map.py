@@ -5,6 +5,7 @@ within its block; a bare NAME means the int16 register, `NAME@BLOCK` any other.
 """
 
 from array import array
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
@@ -197,17 +198,14 @@ class RegisterMap:
 
     def registers_of(self, block: str) -> tuple[Register, ...]:
         """Return the registers of one block, by address."""
-        return tuple(register for register in self.registers if register.block == block)
+        return self._by_block.get(block, ())
 
     def find(self, name: str) -> Register:
         """Return the register of `NAME` or `NAME@BLOCK`. UnknownRegister, with "did you mean", for anything else."""
         if (register := self._by_name.get(name)) is not None:
             return register
-        bare, _, block = name.partition("@")
-        matches = [register for register in self.registers if register.name == bare]
-        if len(matches) == 1 and not block:
-            return matches[0]
-        if matches:
+        bare = name.partition("@")[0]
+        if matches := [register for register in self.registers if register.name == bare]:
             choices = " or ".join(f"{bare}@{register.block}" for register in matches)
             raise UnknownRegister(f"{name} is not a register; did you mean {choices}?")
         raise UnknownRegister(f"{name} is not a register{self._suggest_register(name)}")
@@ -229,9 +227,18 @@ class RegisterMap:
 
     @cached_property
     def _by_name(self) -> dict[str, Register]:
-        names = {f"{register.name}@{register.block}": register for register in self.registers}
+        counts = Counter(register.name for register in self.registers)
+        once = {register.name: register for register in self.registers if counts[register.name] == 1}
         plain = {register.name: register for register in self.registers if register.block in PLAIN_BLOCKS}
-        return plain | names
+        names = {f"{register.name}@{register.block}": register for register in self.registers}
+        return once | plain | names
+
+    @cached_property
+    def _by_block(self) -> dict[str, tuple[Register, ...]]:
+        found: dict[str, list[Register]] = {}
+        for register in self.registers:
+            found.setdefault(register.block, []).append(register)
+        return {block: tuple(registers) for block, registers in found.items()}
 
     @cached_property
     def by_address(self) -> AddressTables:

@@ -173,6 +173,8 @@ def _check_in_time(name: str, address: int, peer: Peer) -> None:
 
 def _check_number(register: Register) -> None:
     """Check that a number of the set is what it is taken for. ValueError: the CRC-32 is over words in one order."""
+    if register.type == "float32" and register.word_order is WordOrder.ABCD and register.name != "crc32":
+        return  # as nearly all of two hundred
     stem, _, index = register.name.rpartition("_")
     name = f"{stem}_0" if index.isdigit() else register.name
     kind = "uint32" if name == "crc32" else "float32"
