@@ -146,6 +146,7 @@ class Simulation:
         self.person.on_model = self._expect_any_model
         self.person.on_tare = self._note_run_tare
         for master in self.masters.values():
+            master.on_start = partial(self._note_start, master.name)
             master.on_refusal = lambda: self.status.note_refusal(self.clock.now_s)
         for client in (*self.masters.values(), self.person):
             client.on_pdu = partial(self._note_pdu, client.name if type(client) is Master else "")
@@ -227,6 +228,9 @@ class Simulation:
         if takes_set(pdu):
             self._expect_any_model()
 
+    def _note_start(self, host: str, pdu: bytes, is_taken: bool) -> None:
+        self.lease.note_start(pdu, self.clock.now_s, is_taken=is_taken, host=host)
+
     def _note_weight(self, pdu: bytes) -> None:
         self.explained.note_change(self.clock.now_s)
         if hangs_payload(pdu):
@@ -262,6 +266,7 @@ class Simulation:
 
     def _on_death(self) -> None:
         self.status.forget_owner()
+        self.lease.forget()
         self.target.forget()
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()

@@ -1,7 +1,8 @@
 """Whether the clock can tell how old recordings are.
 
 One that is years ahead would have them all deleted at once, one that nobody has set would keep them for ever; neither can be
-told from a long rest with certainty, and so it is said.
+told from a long rest with certainty, and so it is said. What has ended a moment ago is no witness: it has its time from the
+clock that is doubted.
 """
 
 import contextlib
@@ -11,7 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from gateway.recording.care.keeping import CLOCK_SET_S, is_being_recorded
+from gateway.recording.care.keeping import CLOCK_SET_S
 
 _DAY_S: Final = 86400.0
 _LAST_S: Final = 253_402_214_400.0  # 9999-12-31
@@ -40,26 +41,29 @@ def doubt_clock(paths: Sequence[Path], days: float, now_s: float) -> Doubt:
     if now_s < CLOCK_SET_S:
         sentence = f"nobody has set this machine's clock ({_date(now_s)}): no recording goes for its age until it is"
         return Doubt(ClockDoubt.UNSET, f"W252 {sentence}; {_CURE}")
-    ended_s, name = max(_ended(paths), default=(now_s, ""))
+    ends = _ended(paths)
+    ended_s, name = max(ends, default=(now_s, ""))
     if ended_s > now_s + _DAY_S:
         clocks = f"recording {name} ended on {_date(ended_s)}, and now this machine's clock says {_date(now_s)}"
         cure = f"{_CURE}, recordings delete N removes one"
         sentence = f"{clocks}: it is behind, or was ahead then. Such recordings do not go for their age; {cure}"
         return Doubt(ClockDoubt.BEHIND, f"W252 {sentence}")
+    fresh_s = min(_DAY_S, 0.5 * days * _DAY_S)
+    ended_s, name = max((end for end in ends if end[0] < now_s - fresh_s), default=(now_s, ""))
     if CLOCK_SET_S <= ended_s < now_s - days * _DAY_S:
-        oldest = f"all recordings are older than {days:g} days, the newest, {name}, is of {_date(ended_s)}"
+        which = f"recordings of more than {'a day' if fresh_s == _DAY_S else f'{fresh_s / 3600.0:g} h'} ago"
+        oldest = f"all {which} are older than {days:g} days, the newest of them, {name}, is of {_date(ended_s)}"
         cure = f"If the clock is ahead, set it within a day: so long none goes for its age; {_CURE}"
         return Doubt(ClockDoubt.AHEAD, f"W252 by this machine's clock ({_date(now_s)}) {oldest}. {cure}")
     return Doubt(ClockDoubt.NONE)
 
 
 def _ended(paths: Sequence[Path]) -> list[tuple[float, str]]:
-    """When those ended that are not being recorded; what cannot be asked tells nothing."""
+    """When each was written last; what cannot be asked tells nothing."""
     ends = []
     for path in paths:
         with contextlib.suppress(OSError):
-            if not is_being_recorded(path):
-                ends.append((path.stat().st_mtime, path.name))
+            ends.append((path.stat().st_mtime, path.name))
     return ends
 
 

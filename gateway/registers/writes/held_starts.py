@@ -109,7 +109,7 @@ class HeldEnables:
         if not self._has_lease:
             return
         before = self._refused.pop(host, None)
-        if before and before.is_same(frame):
+        if before and before.is_same(frame) and before.beats:
             self.note_lost(host, before.heartbeat)
         beats = frame.heartbeat is not None
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
@@ -133,7 +133,8 @@ class HeldEnables:
         if now_s - refused.at_s >= _HELD_S:
             del self._refused[host]
             return False
-        self.note_lost(host, refused.heartbeat)
+        if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
+            self.note_lost(host, refused.heartbeat)
         self._refused[host] = refused._replace(at_s=now_s)
         return True
 
@@ -153,8 +154,10 @@ class HeldEnables:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
         if self._lost_now.get(host, heartbeat) != heartbeat:
             self._find(host)
-        if host in self._refused and self._refused[host].heartbeat != heartbeat:
+        if (refused := self._refused.get(host)) is not None:
             del self._refused[host]
+            if refused.heartbeat == heartbeat:
+                self._refused[host] = refused._replace(beats=True)
 
     def let_go(self, host: str) -> None:
         """Note that a host has written enable as 0."""

@@ -98,7 +98,7 @@ DEFECTS = (
     Defect("what was pulled is pushed by who takes over", "registers/writes/left_setpoints.py",
            "is_pulled is pulls and ", "", ("registers/bank/test_left_setpoints.py",)),
     Defect("what another master has staged is committed", "registers/upload/staging_block.py",
-           "if others := sorted(who - {peer.identity}):", "if others := []:", ("calibrations/test_two_uploads.py",)),
+           "if others := sorted(who - {peer.identity}):", "if others := []:", ("calibrations/test_upload_slots.py",)),
     Defect("the owner is not asked", "registers/writes/ownership.py",
            "return self.owner is None or self.owner == host", "return True", BANK),
     Defect("a takeover beats the rig's own owner", "registers/writes/ownership.py",

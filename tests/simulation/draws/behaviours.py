@@ -11,7 +11,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE = 0.24, 0.03
+SHARE, CROWD_SHARE, REFUSED_SHARE = 0.24, 0.03, 0.15
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),
@@ -36,6 +36,20 @@ BEGUN = (
     Event(0.0, "person", "say", data=b'{"do": "calibration", "use": 0}'),
     Event(0.0, "person", "say", data=b'{"do": "calibrate", "plan": {"groups": 1, "step_v": 0.25}, "name": "20"}'),
 )
+_RUN = (
+    b'{"do": "calibrate", "plan": {"groups": 1, "step_v": 0.25, "minor_points": 0, "response_steps": 0}, "name": "20"}'
+)
+REASONS = (
+    (Event(0.0, "world", "cell-cut", (1.0,)), Event(0.0, "world", "cell-cut", (0.0,))),
+    (Event(0.0, "output", "pull"), Event(0.0, "output", "push")),
+    (Event(0.0, "rival", "take", (20.0,)), Event(0.0, "rival", "let_go")),
+    (Event(0.0, "rival", "take", (40.0,)), Event(0.0, "rival", "fall_silent")),
+    (
+        Event(0.0, "person", "say", data=_RUN),
+        Event(0.0, "person", "say", data=b'{"do": "calibrate", "stop": true}'),
+    ),
+)
+"""Why a start may be refused for a while: how it begins, and how it ends."""
 BLOWS = (
     Event(0.0, "machine", "kill", (0.1, 0.0)),
     Event(0.0, "machine", "kill", (0.1, 0.0)),
@@ -76,6 +90,26 @@ def _hang(chance: Random, at_s: float) -> Iterator[Event]:
     yield Event(round(at_s, 4), whom, "hang")
     if chance.random() < 0.5:
         yield Event(round(at_s + 0.01, 4), other, "hold", (round(chance.uniform(*FORCE_N), 2),))
+
+
+def draw_refused(seed: int) -> Iterator[Event]:
+    """A master commands, again and again, what is refused for a while: its cell is cut, a run of this machine has the output,
+    another one owns, a force is on its way to 0. Its program hangs meanwhile, most often; then the reason is over."""
+    chance = Random(f"refused {seed}")
+    if chance.random() > REFUSED_SHARE:
+        return
+    whom, other = chance.choice((("worker", "rival"), ("rival", "worker")))
+    begins, ends = (replace(each, whom=other if each.whom == "rival" else each.whom) for each in chance.choice(REASONS))
+    at_s = chance.uniform(0.5, 14.0)
+    yield replace(begins, at_s=round(at_s, 4))
+    at_s += chance.choice((0.06, 0.3, 1.0)) * chance.uniform(0.5, 1.5)
+    way = chance.choice(("block", "block", "floats", "singles", "coils"))
+    yield Event(round(at_s, 4), whom, "hold", (round(chance.uniform(*FORCE_N), 2),), way=way)
+    at_s += chance.choice((0.25, 0.6, 1.5)) * chance.uniform(0.5, 1.5)
+    if chance.random() < 0.8:
+        yield Event(round(at_s, 4), whom, "hang")
+    at_s += chance.choice((0.2, 0.6, 2.0)) * chance.uniform(0.5, 1.5)
+    yield replace(ends, at_s=round(at_s, 4))
 
 
 def _stop(chance: Random, at_s: float) -> Iterator[Event]:

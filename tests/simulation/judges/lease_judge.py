@@ -8,6 +8,8 @@ from tests.simulation.judges.observer import DOWN_S, RUN_BITS, Observer
 from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of
 from tests.simulation.masters.tcp_master import TAKE
 
+REPEATED_S = 2.0
+"""In which a frame that is sent on and on comes again: who waits for three seconds has looked."""
 ON_WIRE_S = 0.04
 """20 ms, and two sentences at 9600 baud."""
 
@@ -24,6 +26,8 @@ class LeaseJudge:
         self._renewed_s = -inf
         self._took: set[str] = set()
         """Who has taken over, and has not beaten since."""
+        self._refused: dict[str, tuple[bytes, float]] = {}
+        """Of each master the start, its heartbeat in it, that was refused last, and when."""
 
     def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool, host: str = "") -> None:
         """A write was taken, or nobody knows whether it was. host: of its master."""
@@ -44,6 +48,24 @@ class LeaseJudge:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
         if beat is not None:
             self._beat = beat if is_answered and not isnan(beat) else None
+
+    def note_start(self, pdu: bytes, now_s: float, *, is_taken: bool, host: str) -> None:
+        """A start was answered: told before `note_write`. One that was refused may begin nothing while it stays as it was."""
+        control, beat = control_of(pdu), word_of(pdu, BEAT)
+        if control is None or control <= 0 or not control & (ENABLE | RUN_BITS) or beat is None:
+            return
+        refused, refused_s = self._refused.pop(host, (b"", -inf))
+        if not is_taken:
+            self._refused[host] = pdu, now_s
+            return
+        is_again = pdu == refused and now_s - refused_s < REPEATED_S
+        if is_again and self._observer.disabled_s is not None and self._observer.bounds.lease_s < inf:
+            told = f"{host} began by {pdu.hex()}, which was refused {now_s - refused_s:.3f} s before"
+            self._observer.complain("I7 repeated start", told, now_s)
+
+    def forget(self) -> None:
+        """Another process does not know what was refused once."""
+        self._refused.clear()
 
     def note_local_run(self, now_s: float) -> None:
         """A run that a person watches at the machine needs no master."""

@@ -57,6 +57,7 @@ class Master:
 
     badge: tuple[str, str] = ("", "")
     on_pdu: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_answered: None)
+    on_start: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_taken: None)
     on_refusal: Callable[[], None] = staticmethod(lambda: None)
     _is_hung = False
 
@@ -272,6 +273,7 @@ class Master:
             return
         self.heard.append((self._outside.time(), pdu))
         del self.heard[:-64]
+        self.on_start(asked.pdu, not pdu[0] & 0x80)
         if pdu[0] & 0x80:
             self._judge_refusal(asked, pdu[1])
         if pdu[0] in WRITES:

@@ -67,6 +67,8 @@ class RecordingRetention:
         if doubt.kind is ClockDoubt.AHEAD and self._doubted_s is None:
             self._doubted_s = now_s
         is_doubted = self._doubted_s is not None and now_s < self._doubted_s + _DOUBT_S
+        if doubt.kind is not ClockDoubt.AHEAD and not is_doubted:
+            self._doubted_s = None  # the next leap is another one
         return replace(self._retention, days=None) if is_doubted else self._retention
 
     def _tell(self, gone: Any) -> None:

@@ -4,6 +4,7 @@ the reason for its refusal is over. A program that goes on begins with its next 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from struct import pack
+from typing import Any
 
 import pytest
 
@@ -16,6 +17,7 @@ from gateway.modbus import Peer
 from gateway.profiles import load_calibration
 from gateway.registers import Refusal
 from gateway.registers.words import State
+from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
 from tests.service.running_rig.simulated_rig import ENABLE, OWNER, RESET, SELF_TEST, TAKE, SmallRig
 
@@ -191,3 +193,25 @@ def test_who_writes_no_heartbeat_and_has_waited_or_has_no_lease_begins(lease_s: 
     rig.is_cell_silent = False
     rig.run(0.3 if lease_s is None else 3.1)
     assert rig.answer(0, ENABLE, 1200) is None and rig.state in MOVING
+
+
+@pytest.mark.parametrize("face", [*FACES, "a person"])
+def test_behind_a_restart_no_program_begins_that_hung_while_it_was_refused_and_a_person_does(face: str) -> None:
+    kept: dict[str, Any] = {}
+    rig, answers = SmallRig(_control(LeaseAction.HOLD)), list[list[Refusal]]()
+    faces = {"a person": (_words(0, ENABLE, 1200),)} | FACES
+    for process in range(2):
+        rig = SmallRig(_control(LeaseAction.HOLD))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.is_cell_silent, rig.beats = not process, False
+        rig.run(1.0)
+        for _ in range(6):
+            answers.append([])
+            for frame in faces[face]:
+                try:
+                    frame(rig, BEAT)
+                except Refusal as refusal:
+                    answers[-1].append(refusal)
+            rig.run(0.05)
+    assert (rig.state in MOVING) is (face == "a person")
+    assert bool(answers[-1]) is (face != "a person")

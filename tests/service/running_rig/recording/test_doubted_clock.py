@@ -40,7 +40,9 @@ def test_a_clock_that_is_years_ahead_takes_nothing_for_a_day_and_says_so(
     machine.wall_s = NOW_S + 3650 * DAY_S
     assert machine.prune(100.0) == machine.prune(3700.0) == []
     assert len(machine.said) == 1
-    assert machine.said[0].startswith("W252 by this machine's clock (2033-11-11) all recordings are older than 90 days")
+    assert machine.said[0].startswith(
+        "W252 by this machine's clock (2033-11-11) all recordings of more than a day ago are older"
+    )
     assert "0003.fgr, is of 2023-11-12" in machine.said[0]
     machine.wall_s = NOW_S + 0.5 * DAY_S  # somebody, or a time server, has set it
     assert machine.prune(7300.0) == []
@@ -110,7 +112,7 @@ def test_what_is_being_recorded_is_no_witness_for_the_clock(tmp_path: Path) -> N
     paths = recording_paths(tmp_path)
     assert doubt_clock(paths, 90.0, now_s).kind is ClockDoubt.AHEAD
     growing.close()
-    assert doubt_clock(paths, 90.0, now_s).kind is ClockDoubt.NONE
+    assert doubt_clock(paths, 90.0, now_s).kind is ClockDoubt.AHEAD
 
 
 @pytest.mark.parametrize(("ahead_days", "kind"), [(0.9, ClockDoubt.NONE), (1.1, ClockDoubt.BEHIND)])
@@ -119,3 +121,46 @@ def test_a_recording_of_more_than_a_day_from_now_is_no_summer_time(
 ) -> None:
     record(tmp_path, days_ago=-ahead_days)
     assert doubt_clock(recording_paths(tmp_path), 90.0, NOW_S).kind is kind
+
+
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_a_recording_that_ended_by_the_wrong_clock_before_anybody_looked_is_no_witness_for_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, is_restarted: bool
+) -> None:
+    """The clock leapt while the rig recorded, and the next recording that ended by its length took all others with it; so did a
+    restart within the day."""
+    for days_ago in (400.0, 3.0, 2.0):
+        record(tmp_path, days_ago=days_ago)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    assert machine.prune(0.0) == ["0001"]
+    machine.wall_s = NOW_S + 3650 * DAY_S
+    if is_restarted:
+        assert machine.prune(3600.0) == []
+        machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+        machine.wall_s = NOW_S + 3650 * DAY_S
+    record(tmp_path, days_ago=-3650.0)
+    assert machine.prune(3700.0) == machine.prune(3700.0 + 0.9 * DAY_S) == []
+    assert machine.said[-1].startswith(
+        "W252 by this machine's clock (2033-11-11) all recordings of more than a day ago are"
+    )
+    assert machine.prune(3700.0 + 1.1 * DAY_S) == ["0002", "0003"], "nobody has set it: it was right"
+
+
+def test_a_clock_that_leaps_again_weeks_later_is_doubted_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record(tmp_path, days_ago=3.0)
+    machine = Machine(tmp_path, Retention(days=90.0), monkeypatch)
+    for leap in (0, 1):
+        at_s = leap * 20.0 * DAY_S
+        machine.wall_s = NOW_S + 3650 * DAY_S
+        assert machine.prune(at_s + 3600.0) == []
+        machine.wall_s = NOW_S
+        assert machine.prune(at_s + 7200.0) == machine.prune(at_s + 2.0 * DAY_S) == []
+    assert len(machine.said) == 2
+
+
+def test_of_hours_that_are_kept_the_older_ones_go_while_the_clock_goes_along(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for hours_ago in (8.0, 5.0, 1.0):
+        record(tmp_path, days_ago=hours_ago / 24.0)
+    assert Machine(tmp_path, Retention(days=0.25), monkeypatch).prune(0.0) == ["0001"]

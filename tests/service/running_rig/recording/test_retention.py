@@ -3,6 +3,7 @@
 import asyncio
 import os
 import threading
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,16 +29,17 @@ class Said:
         self.heard.set()
 
 
-def record_now(state: Path) -> Path:
-    """Record one by which the clock is believed."""
+def record_of_late(state: Path) -> Path:
+    """Record one by which the clock is believed: two days ago."""
     path = record(state)
-    os.utime(path)
+    ended_s = time.time() - 2 * 86400.0
+    os.utime(path, (ended_s, ended_s))
     return path
 
 
 async def prune_at(state: Path, *times_s: float) -> list[str]:
     said = Said()
-    record_now(state)
+    record_of_late(state)
     retention = RecordingRetention(state, Retention(days=30.0), said)
     for now_s in times_s:
         record(state, days_ago=1_000)
@@ -88,7 +90,7 @@ def test_the_rigs_reference_stays_however_old_it_is(
     tmp_path: Path, is_reference: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = record(tmp_path, days_ago=1_000)
-    record_now(tmp_path)
+    record_of_late(tmp_path)
     reference = SimpleNamespace(name=path.name) if is_reference else None
     monkeypatch.setattr(
         "gateway.service.running_rig.recording.retention.read_reference_recording", lambda state: reference
@@ -141,7 +143,7 @@ def test_the_ladder_of_the_calibration_in_use_stays_however_old_it_is(
 ) -> None:
     """Kept by no mark: that it is needed is known by the calibrations alone."""
     paths = [record(tmp_path, days_ago=1_000) for _ in range(3)]
-    record_now(tmp_path)
+    record_of_late(tmp_path)
     monkeypatch.setattr(module, "kept_ladders", lambda state: frozenset({paths[1].name}))
     retention = RecordingRetention(tmp_path, Retention(days=30.0), Said())
     retention.close()

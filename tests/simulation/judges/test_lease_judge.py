@@ -1,0 +1,60 @@
+"""Whether a start that was refused and comes on and on is seen by the judge, and drawn often enough to be met."""
+
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from tests.simulation.draws.behaviours import draw_refused
+from tests.simulation.draws.event import Event
+from tests.simulation.judges.lease_judge import LeaseJudge
+from tests.simulation.judges.observer import Bounds, Observer
+from tests.simulation.masters.spelling import write_one_pdu, write_pdu
+from tests.simulation.schedule import run_schedule
+
+BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
+FRAME = write_pdu(0, 1, 1200, 0, 0, 7)
+
+
+@pytest.mark.parametrize(
+    ("lease_s", "taken", "at_s", "is_seen"),
+    [
+        (0.2, FRAME, 1.1, True),
+        (0.2, FRAME, 5.0, False),
+        (0.2, write_pdu(0, 1, 1200, 0, 0, 8), 1.1, False),
+        (0.2, write_one_pdu(4, 7), 1.1, False),
+        (inf, FRAME, 1.1, False),
+    ],
+)
+def test_who_begins_by_the_frame_that_was_refused_is_seen(
+    lease_s: float, taken: bytes, at_s: float, *, is_seen: bool
+) -> None:
+    observer = Observer(replace(BOUNDS, lease_s=lease_s))
+    judge = LeaseJudge(observer)
+    for moment_s in (0.9, 1.0):
+        judge.note_start(FRAME, moment_s, is_taken=False, host="10.0.0.1")
+    judge.note_start(FRAME, 1.0, is_taken=True, host="10.0.0.2")
+    judge.note_start(taken, at_s, is_taken=True, host="10.0.0.1")
+    assert bool(observer.broken) is is_seen
+    judge.note_start(FRAME, 6.0, is_taken=False, host="10.0.0.1")
+    judge.forget()
+    judge.note_start(FRAME, 6.1, is_taken=True, host="10.0.0.1")
+    assert len(observer.broken) == is_seen
+
+
+def test_programs_that_hang_while_they_are_refused_are_drawn_by_every_face() -> None:
+    scenes = [scene for seed in range(600) if (scene := list(draw_refused(seed)))]
+    assert 60 < len(scenes) < 120
+    assert {scene[1].way for scene in scenes} == {"block", "floats", "singles", "coils"}
+    assert sum(scene[-2].what == "hang" for scene in scenes) > 50
+
+
+def test_a_cell_that_is_plugged_in_again_lets_no_program_press_that_hung_meanwhile() -> None:
+    events = [
+        Event(2.0, "world", "cell-cut", (1.0,)),
+        Event(2.5, "worker", "hold", (30.0,)),
+        Event(3.0, "worker", "hang"),
+        Event(3.5, "world", "cell-cut", (0.0,)),
+    ]
+    outcome = run_schedule(90029, events, 6.0)
+    assert outcome.broken == () and outcome.largest_v > 0.0
