@@ -9,6 +9,7 @@ import pytest
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
 from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 OWN_SOCKETS = ["rapid", "urscript", "python", "c"]
@@ -158,3 +159,13 @@ def test_a_robot_that_could_not_let_go_does_so_when_its_timer_starts_again(stops
     client.machine.start("FgTimerStart")
     cycles(client)
     assert commands(gateway) == [command(1, 1200), command(0, 0)]
+
+
+@pytest.mark.parametrize(("counts", "word"), [(-200.4, 65336), (-200.6, 65335), (200.4, 200), (200.6, 201)])
+def test_a_word_that_a_robot_sets_is_the_nearest_count(counts: float, word: int, gateway: GatewayAtHand) -> None:
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    place = robot.get("FG_C_TILT_ANGLE")
+    assert robot.machine.start("fg_set_command", place, counts)
+    robot.enable(12.0)
+    cycles(robot)
+    assert gateway.words[-1][place] == word

@@ -74,3 +74,10 @@ def test_a_late_reading_shows_its_moment_after_any_time(first: int) -> None:
         shown = max(step - 100.25, first)
         assert history.at(shown * 0.001) == pytest.approx(shown)
     assert len(history._values) < 10_000
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_an_amplifier_that_loses_the_sign_shows_a_push_as_one_however_its_cell_is_wired(sign: int) -> None:
+    twin = pressed(LoadCell(sign_lost=1.0))
+    twin.set_sign(sign)
+    assert twin.read() == pytest.approx(18.0)

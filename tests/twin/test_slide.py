@@ -6,6 +6,7 @@ import pytest
 from gateway.twin import Contact, Cylinder, Friction, Plant, Regulator, Twin
 from gateway.twin.experiment import Floats
 from gateway.twin.friction import age_stiction
+from gateway.twin.slide import SlideState, advance_slide, slide_of
 from tests.twin.traces import trace
 
 NEWTON_PER_VOLT = 9.0
@@ -168,3 +169,13 @@ def test_a_motion_takes_away_what_its_own_step_has_rested_too() -> None:
     assert age_stiction(0.0, 2.0, 1.0e9, 0.0) == (2.0, 2.0)
     assert age_stiction(1.0, 2.0, 1.0e9, 1.0e3) == (1.0, 0.0)
     assert age_stiction(1.0, 2.0, 0.0, 1.0) == (0.0, pytest.approx(np.exp(-1.0)))
+
+
+def test_what_drags_more_on_its_way_out_drags_less_on_its_way_back() -> None:
+    friction = Friction(viscous_n_s_per_m=50.0, asymmetry_n_s_per_m=30.0)
+    slide = slide_of(Plant(friction=friction, cylinder=Cylinder(stroke_m=1.0), contact=Contact(gap_m=0.9)))
+    state = SlideState(position_m=0.4)
+    for outside_n, speed_m_per_s in ((8.0, 8.0 / 80.0), (-8.0, -8.0 / 20.0)):
+        for _ in range(50):
+            state = advance_slide(slide, state, (0.0, 0.0, 0.0, outside_n), 1.0e-3, 1.0e-3)
+        assert state.travel_m / 1.0e-3 == pytest.approx(speed_m_per_s, rel=1.0e-3)

@@ -85,6 +85,7 @@ def test_registers_between_are_written_back_as_they_were(fake, call) -> None:
         ("control_word=enable,tare", (0, (5,))),
         ("control_word=enable+take-ownership", (0, (9,))),
         ("control_word=0x1", (0, (1,))),
+        ("control_word=enable,0x1+enable", (0, (1,))),  # said thrice it is no other bit
         ("mode=voltage", (3, (1,))),
         ("mode=1", (3, (1,))),
         ("force_setpoint=12.345", (1, (1234,))),  # to the register's resolution

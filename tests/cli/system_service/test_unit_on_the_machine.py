@@ -15,7 +15,7 @@ from gateway import profiles
 from gateway.cli.errors import CliError
 from gateway.cli.main import command
 from gateway.cli.system_service import installation
-from gateway.cli.system_service.installation import plan_installation
+from gateway.cli.system_service.installation import install_service, plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 from gateway.processes import exit_codes
 from gateway.processes.scheduling import priority
@@ -53,6 +53,50 @@ def test_control_comes_before_other_programs_though_the_process_that_forks_it_do
 def test_a_stop_leaves_control_its_last_write() -> None:
     """By any other way systemd kills whoever is left as soon as the guardian is gone."""
     assert setting("KillMode", "control-group") == "control-group"
+
+
+def test_a_loop_that_stands_still_is_started_anew_by_systemd() -> None:
+    """Who says nothing to it is killed: without a watchdog a guardian that hangs would hang for good."""
+    assert (setting("Type", "simple"), setting("NotifyAccess", "none")) == ("notify", "main")
+    assert 1.0 < float(setting("WatchdogSec", "inf")) <= 30.0 and setting("Restart", "no") == "always"
+
+
+@pytest.mark.parametrize(("port", "needs"), [(0, False), (1, True), (502, True), (1023, True), (1024, False)])
+def test_only_a_port_below_1024_needs_a_privilege(port: int, needs: bool) -> None:
+    text = unit_text(UnitOptions(command=Path("/usr/bin/true"), rig="demo", stem="demo", ports=(5020, port)))
+    assert ("CAP_NET_BIND_SERVICE" in text) == needs and ("PrivateUsers=yes" in text) != needs
+
+
+def test_whoever_reads_a_unit_meanwhile_reads_the_old_one_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Half a unit of a disk that was full has no end of its settings, and starts a gateway that may do anything."""
+    plan = plan_installation("demo", load_rig("demo"), networks=(), command=Path("/opt/force-gateway"))
+    install_service(plan, tmp_path)
+    write, written = Path.write_text, list[str]()
+
+    def note(path: Path, text: str, **how: Any) -> int:
+        written.append(path.name)
+        return write(path, text, **how)
+
+    monkeypatch.setattr(Path, "write_text", note)
+    install_service(plan, tmp_path)
+    there = [path.name for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(written) == 3 and not set(written) & set(there)
+    assert sorted(there) == sorted(Path(name).name for name in plan.files)
+
+
+def test_a_unit_that_is_gone_is_gone_for_systemd_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be started again by its old text."""
+    unit, asked = tmp_path / "force-gateway-cell.service", list[tuple[object, ...]]()
+    unit.write_text("[Unit]\n")
+    monkeypatch.setattr(installation, "UNITS", str(tmp_path))
+    monkeypatch.setattr(installation, "run_command", lambda words, **_: asked.append((*words, unit.exists())))
+    installation.uninstall_service("cell", Path("/"))
+    assert asked == [
+        ("systemctl", "disable", "--now", unit.name, True),
+        ("systemctl", "daemon-reload", False),
+    ]
 
 
 def test_a_helper_that_the_kernel_ends_for_want_of_memory_does_not_end_the_gateway() -> None:

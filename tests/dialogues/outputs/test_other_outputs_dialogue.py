@@ -53,6 +53,14 @@ PSI_PA = 6894.757
         (ALICAT, SetVoltage(0.544), b"as5.44\r", b"?\r", Refused("?")),
         (MCU, SetVoltage(5.0), b"V1 5.0000*5C\n", b"OK 5.0000*3F\n", Accepted(5.0)),
         (MCU, SetVoltage(5.0), b"V1 5.0000*5C\n", b"ERR TRIPPED*2B\n", WatchdogTripped()),
+        (
+            MCU,
+            AskDevice(DeviceStep.ARM),
+            b"W 500*42\n",
+            b"OK W 500*66\n",
+            DeviceAnswer(DeviceStep.ARM, True, "500"),
+        ),  # ms
+        (MCU, ReadPressure(), b"?*3F\n", b"S V=5.0000 P=450.0 T=20 FLT=0*59\n", Pressure(450.0e3)),
     ],
 )
 def test_a_question_and_its_answer(

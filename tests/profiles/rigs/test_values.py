@@ -4,6 +4,7 @@ from dataclasses import replace
 from ipaddress import ip_network
 from pathlib import Path
 
+from gateway.control import LeaseAction
 from gateway.profiles import check_report, load_plant, load_rig
 from gateway.registers.words import ControlBit
 
@@ -23,6 +24,7 @@ def test_the_demo_rig_has_no_lease_and_is_simulated_on_loopback() -> None:
 def test_the_real_cell_has_a_lease_ports_by_id_and_an_allow_list() -> None:
     rig = load_rig("irc5-cell")
     assert not rig.simulated and rig.control.supervision.lease_s == 0.2 and rig.loop_hz == 100
+    assert rig.control.supervision.lease_action is LeaseAction.FAULT, "whose master is lost lets go"
     assert all(port.startswith("/dev/serial/by-id/") for port in rig.ports().values()) and len(rig.ports()) == 2
     assert rig.network.allow == (ip_network("192.168.125.0/24"),)
 

@@ -47,6 +47,17 @@ def test_esc_stops_from_each_of_them(tabs: list[Any], control: ScriptedControl) 
         assert written(control) == [*before, STOP]
 
 
+def test_the_tabs_that_have_made_way_for_a_stop_come_back(tabs: list[Any]) -> None:
+    """They would show a force of before the stop until somebody loads them anew."""
+    from playwright.sync_api import expect
+
+    tabs.pop().close()
+    tabs[0].keyboard.press("Escape")
+    expect(tabs[1].locator("#gone")).to_be_visible(timeout=10_000)
+    for window in tabs:
+        expect(window.locator("#gone")).to_be_hidden(timeout=10_000)
+
+
 def test_what_found_no_way_out_is_given_up_and_never_sent(tabs: list[Any], control: ScriptedControl) -> None:
     """It pressed when somebody closed another tab, minutes later."""
     begin = """async () => {
