@@ -151,11 +151,15 @@ class Surroundings:
 
     def _judge_watchdog(self) -> None:
         """While it presses, the device's own watchdog watches; one that has forgotten is armed anew."""
-        now_s, watchdog = self._outside.time(), getattr(self.world._output, "watchdog", None)
-        presses = not self._observer.is_safe and self._observer.output_lost_s is None
-        is_off = presses and watchdog is not None and watchdog.state is WatchdogState.OFF
-        self._unwatched_s = _since(self._unwatched_s, is_off, now_s)
-        if self._unwatched_s is not None and now_s - self._unwatched_s > UNWATCHED_S:
+        watchdog = getattr(self.world._output, "watchdog", None)
+        is_off = watchdog is not None and watchdog.state is WatchdogState.OFF
+        if not is_off or self._observer.is_safe or self._observer.output_lost_s is not None:
+            self._unwatched_s = None
+            return
+        now_s = self._outside.time()
+        if self._unwatched_s is None:
+            self._unwatched_s = now_s
+        if now_s - self._unwatched_s > UNWATCHED_S:
             self._observer.complain("I6", "it presses, and the device's watchdog does not watch", now_s)
             self._unwatched_s = now_s
 
@@ -170,7 +174,8 @@ class Surroundings:
     def tell_reasons(self, reasons: ReasonJudge) -> None:
         """Say what is disturbed now."""
         now_s = self._outside.time()
-        reasons.note_settings(self.world.settings.values, now_s)
+        if values := self.world.settings.values:
+            reasons.note_settings(values, now_s)
         for line, cable in CABLES.items():
             if cable.is_disturbed or line in self._pulled:
                 reasons.note(line, now_s)

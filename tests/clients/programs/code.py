@@ -33,12 +33,15 @@ STOPPING = {"AND": ("False", "&"), "OR": ("True", "|")}
 LOCALS = {
     "v": "frame.variables",
     "g": "machine.global_names",
-    "routine": "machine.called_alone.get",
+    "assigned": "frame.assigned",
+    "takes": "machine.takes.get",
+    "takes_named": "machine.takes_named.get",
     "look_up": "machine.look_up",
+    "first": "machine.first_index",
     "place": "machine.place",
     "member_of": "machine.member_of",
     "keep": "machine.keep_variable",
-    "call": "machine.call_routine",
+    "store": "machine.store",
 }
 """Names that a function's text uses, if it does, and what they are."""
 made: dict[tuple[int, bool, str], tuple[Any, Any]] = {}
@@ -163,10 +166,21 @@ class Writer:
         return f"[{', '.join(map(self.value, node[1]))}]"
 
     def index_value(self, node: Node) -> str:
-        return f"{self.value(node[1])}[{self.local('place')}({self.value(node[2][0])})]"
+        return f"{self.value(node[1])}[{self.place(node[2][0])}]"
+
+    def place(self, index: Node) -> str:
+        """Return the place in a list, which `machine.place` judges where it may be none."""
+        first, found = self.local("first"), self.new()
+        if index[0] == "value" and type(index[1]) is int and index[1] > 0:
+            return f"{index[1]} - {first}"
+        is_one = f"type({found} := {self.value(index)}) is int and {found} >= {first}"
+        return f"{found} - {first} if {is_one} else {self.local('place')}({found})"
 
     def field_value(self, node: Node) -> str:
-        return f"{self.local('member_of')}({self.value(node[1])}, {node[2]!r}, {self.key(node[2])})"
+        """Most are of a structure."""
+        holder, key = self.new(), self.key(node[2])
+        other = f"{self.local('member_of')}({holder}, {node[2]!r}, {key})"
+        return f"({holder}[{key}] if type({holder} := {self.value(node[1])}) is dict else {other})"
 
     def bit_value(self, node: Node) -> str:
         word, number = self.value(node[1]), node[3]
@@ -185,9 +199,9 @@ class Writer:
         if target[0] != "name":
             return f"{self.value(target)}.call({words})"
         key, known = self.key(target[1]), self.new()
-        folded_words = f"{{{', '.join(f'{self.key(name)}: {value}' for name, value in named)}}}"
-        given = folded_words if named else f"[{', '.join(plain)}]"
-        text = f"{self.local('call')}({known}, {given}) if ({known} := {self.local('routine')}({key})) else "
+        folded_words = f"**{{{', '.join(f'{self.key(name)}: {value}' for name, value in named)}}}"
+        given, takes = (folded_words, "takes_named") if named else (", ".join(plain), "takes")
+        text = "" if named and plain else f"{known}({given}) if ({known} := {self.local(takes)}({key})) else "
         if not plain:
             text += f"{known}.call({words}) if ({known} := machine.instance({key}, {self.local('v')})) else "
         return f"({text}machine.use({key}, {self.kept(arguments)}, frame))"
@@ -229,11 +243,15 @@ class Writer:
     def keep(self, target: Node, value: str, scope: str) -> None:
         """Assign to a place. scope: the text of URScript's `local` or `global`, in capitals."""
         if target[0] == "name":
-            key = self.key(target[1])
-            self.line(f"{self.local('keep')}({key}, {self.kept(target)}, {value}, frame, {scope})")
+            key, assigned = self.key(target[1]), self.local("assigned")
+            at_length = f"{self.local('keep')}({key}, {self.kept(target)}, {value}, frame, {scope})"
+            kept = f"{value} if type({value}) is bool else {self.local('store')}({assigned}[{key}], {value})"
+            with self.below(f"if {key} in {assigned}:" if scope == "''" else "if False:"):
+                self.line(f"{self.local('v')}[{key}] = {kept}")
+            self.line(f"else: {at_length}")
         elif target[0] == "index":
-            index = f"{self.local('place')}({self.value(target[2][0])})"
-            self.line(f"machine.keep_item({self.value(target[1])}, {index}, {value}, {self.kept(target)})")
+            items, index = self.value(target[1]), self.place(target[2][0])
+            self.line(f"machine.keep_item({items}, {index}, {value}, {self.kept(target)})")
         else:
             holder, name = self.value(target[1]), target[2]
             self.line(f"machine.keep_field({holder}, {name!r}, {self.key(name)}, {value})")

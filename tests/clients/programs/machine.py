@@ -8,6 +8,7 @@ routine is also the check that everything is declared.
 import copy
 import struct
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from tests.clients.programs.code import RapidError, code_of, key_of
@@ -50,13 +51,15 @@ class Union(dict[str, Any]):
 
 
 class Frame:
-    """One call: its variables, and what each of them keeps of a value."""
+    """One call: its variables, and what each of them keeps of a value. assigned: the same of those to which anything may be
+    assigned that they can keep."""
 
-    __slots__ = ("constants", "keepers", "variables")
+    __slots__ = ("assigned", "constants", "keepers", "variables")
 
     def __init__(self, variables: dict[str, Any], declared: "Declared | None" = None) -> None:
         self.variables = variables
         self.keepers = declared.keepers if declared else {}
+        self.assigned = declared.assigned if declared else {}
         self.constants = declared.constants if declared else frozenset()
 
 
@@ -67,6 +70,8 @@ class Declared:
         key, entries = machine.key, routine.variables.items()
         self.keepers = {key(name): machine.keeper_of(kind) for name, (kind, _, _) in entries}
         self.constants = frozenset(key(name) for name, (_, _, section) in entries if "CONST" in section)
+        free = {} if machine.is_typed else self.keepers
+        self.assigned = {name: keep for name, keep in free.items() if name not in self.constants}
         self.parameters = [(key(name), machine.keeper_of(kind)) for name, kind, _ in routine.parameters]
         given = {name for name, _ in self.parameters}
         local = [(key(name), kind, initial) for name, (kind, initial, _) in entries if key(name) not in given]
@@ -79,14 +84,22 @@ class Declared:
         }
 
 
+def call_in_order(act: Callable[..., Any], /, **named: Any) -> Any:
+    return act(*named.values())
+
+
 class Machine:
     """global_names: variables of the module, program or data blocks."""
 
     def __init__(self, unit: Unit, library: dict[str, Callable[..., Any]], *, fold: bool = True) -> None:
         self.unit, self.library, self.fold = unit, library, fold
         self.routines = {self.key(name): routine for name, routine in unit.routines.items()}
-        self.called_alone = {key: each for key, each in self.routines.items() if each.kind != "FUNCTION_BLOCK"}
-        """Others are called by an instance of theirs."""
+        plain = {key: each.act for key, each in library.items() if hasattr(each, "act")}
+        alone = [key for key, each in self.routines.items() if each.kind != "FUNCTION_BLOCK"]  # which an instance calls
+        routines = {key: partial(self.call_routine, self.routines[key]) for key in alone}
+        self.takes: dict[str, Callable[..., Any]] = plain | routines
+        self.takes_named = {key: partial(call_in_order, act) for key, act in plain.items()} | routines
+        """What is called with the values of its arguments alone, in their order or by their names."""
         self.declared = {self.key(name): entry for name, entry in unit.variables.items()}
         self.global_keepers = {name: self.keeper_of(kind) for name, (kind, _, _) in self.declared.items()}
         self.types = {self.key(name): members for name, members in unit.types.items()}
@@ -249,14 +262,15 @@ class Machine:
             raise NameError(f"{key} is neither a routine nor known to the controller")
         return self.library[key](self, arguments, frame)
 
-    def call_routine(self, routine: Routine, given: Any) -> Any:
-        """given: arguments in their order, or by name."""
+    def call_routine(self, routine: Routine, /, *arguments: Any, **named: Any) -> Any:
+        """Call it with arguments in their order, or by name."""
+        given: Any = named or arguments
         if len(given) != len(routine.parameters):
             raise TypeError(f"{routine.name}: {len(given)} arguments, {len(routine.parameters)} are wanted")
         declared = self.declared_by(routine)
         variables = dict(declared.plain)
         for k, (name, keep) in enumerate(declared.parameters):
-            variables[name] = self.store(keep, given[name] if type(given) is dict else given[k])
+            variables[name] = self.store(keep, named[name] if named else arguments[k])
         for name, kind, initial in declared.made:
             variables[name] = self.fresh(kind, initial)
         returned = self.run_body(routine, Frame(variables, declared))
@@ -282,4 +296,4 @@ class Machine:
     def start(self, name: str, *arguments: Any) -> Any:
         """Call a routine from outside."""
         self.steps = 0
-        return self.call_routine(self.routines[self.key(name)], arguments)
+        return self.call_routine(self.routines[self.key(name)], *arguments)

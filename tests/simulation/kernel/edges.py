@@ -294,6 +294,11 @@ def simulated_edges(fit: Any = _no_fit) -> Any:
         patch.setattr(f"{_RIG}.SchedulerCounters", NoCounters)
         for user in (_RIG, f"{_SUPERVISOR}.heartbeat"):
             patch.setattr(f"{user}.WithheldTime", NothingWithheld)
+        for user in (
+            _RIG,
+            "gateway.live.standstill",
+        ):  # no machine that is suspended, and six clocks fewer at each tick
+            patch.setattr(f"{user}.suspended_s", lambda: 0.0)
         patch.setattr("gateway.service.running_rig.starting.explain_silent_device", _explain)
         patch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", fit)
         for user in (

@@ -171,8 +171,8 @@ class SimulatedService:
     @property
     def is_serving(self) -> bool:
         """Whether control works: it is there, listens, and is not stopped."""
-        inside = self.inside
-        return inside is not None and bool(inside.servers) and not inside.is_halted
+        process = self._processes[-1]
+        return process.exit_code is None and bool(process.loop.servers) and not process.loop.is_halted
 
     @property
     def is_guarded(self) -> bool:

@@ -8,11 +8,12 @@ from tests.clients.programs.syntax.parser import Node
 
 
 def values(act: Callable[..., Any]) -> Callable[[Machine, list[Node], Frame], Any]:
-    """Return a library routine that gets its arguments' values in their order."""
+    """Return a library routine that gets its arguments' values in their order. Who has them already calls `act` itself."""
 
     def call(machine: Machine, arguments: list[Node], frame: Frame) -> Any:
         return act(*machine.values(arguments, frame))
 
+    call.act = act  # type: ignore[attr-defined]
     return call
 
 
