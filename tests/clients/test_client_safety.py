@@ -6,9 +6,12 @@ from typing import Any
 
 import pytest
 
+from gateway.registers.words import ControlBit
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
+from tests.clients.programs.c_program import CProgram
 from tests.clients.programs.controllers.irc5 import Irc5
+from tests.clients.programs.controllers.plc import Plc
 from tests.clients.programs.controllers.universal_robot import UniversalRobot
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
@@ -169,3 +172,26 @@ def test_a_word_that_a_robot_sets_is_the_nearest_count(counts: float, word: int,
     robot.enable(12.0)
     cycles(robot)
     assert gateway.words[-1][place] == word
+
+
+def take(client: Any) -> None:
+    """Have a client ask for the setpoint that another master owns."""
+    if isinstance(client, Plc):
+        client.inputs[client.NAMES["take"]] = True
+    elif isinstance(client, Irc5):
+        client.set(fgTake=True)
+    elif isinstance(client, UniversalRobot):
+        client.machine.start("fg_take_ownership")
+    elif isinstance(client, CProgram):
+        client._library.fg_take_ownership(client._client)
+    else:
+        client.client.take_ownership()
+
+
+def test_who_takes_over_asks_for_that_and_for_no_zero_of_the_cell(client: Any, gateway: GatewayAtHand) -> None:
+    """A tare under another master's force would make it the zero of its own."""
+    gateway.take_over_from_elsewhere()
+    cycles(client)
+    take(client)
+    cycles(client)
+    assert [words[0] for words in gateway.words] == [int(ControlBit.TAKE_OWNERSHIP)]

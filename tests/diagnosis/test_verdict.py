@@ -1,12 +1,14 @@
 """What an answer may call itself, and what its figures may never say of each other."""
 
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.diagnosis import Options, Verdict, diagnose
+from gateway.diagnosis.experiments import identifiability
 from gateway.diagnosis.experiments.identifiability import _why
 from gateway.diagnosis.verdict import _decide_verdict
 from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
@@ -33,6 +35,7 @@ def test_a_verdict_never_says_more_than_is_known(caused: bool, left: bool, reach
 def test_the_figures_of_an_answer_agree_with_each_other(share: float, creep_s: float, given_n: float | None) -> None:
     hidden = {"contact.creep_share": share, "contact.creep_s": creep_s}
     answer = diagnose([recorded(hidden, seed=2, time_s=times_s(24.0, 100.0))], MACHINE, Options(noise_floor_n=given_n))
+    assert answer.base.cell.zero_n > 0.0, "the offset is the cell's, with its own sign"
     assert answer.baseline.noise_floor_n <= min(answer.extended.held_out_rms_n, answer.baseline.rms_n)
     (cause,) = answer.causes
     known = {one.name: one for form in BY_NAME[cause.name].forms for one in form.parameters}
@@ -48,3 +51,14 @@ def test_what_the_base_model_absorbs_is_told_by_how_much(share: float, told: str
     effect = BY_NAME["creep"]
     said = _why(effect, frozenset({"command_v"}), 400.0, share)
     assert told in said and effect.excitation in said
+
+
+def test_what_readings_tell_by_themselves_is_never_among_what_a_recording_cannot_show(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(identifiability, "with_known_rests", lambda *_: None)
+    nothing: Any = SimpleNamespace(beside=SimpleNamespace(parameters=None, free=()), scores=())
+    bench: Any = SimpleNamespace(columns=lambda: frozenset({"command_v"}))
+    found = identifiability.find_invisible_effects(bench, EFFECTS, nothing, frozenset({"creep"}))
+    told = {effect.name for effect in EFFECTS if not effect.direct and effect.name != "creep"}
+    assert {each.name for each in found} == told and all(each.why for each in found)

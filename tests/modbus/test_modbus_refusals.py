@@ -186,6 +186,7 @@ FAULTS = [
     ("03 0005 007e", RequestFault.QUANTITY, 126, 5),
     ("03 0005 0000", RequestFault.QUANTITY, 0, 5),
     ("10 0007 0001 03 000100", RequestFault.QUANTITY, 3, 7),
+    ("0f 0005 07b1 f7" + 247 * "00", RequestFault.QUANTITY, 1969, 5),
     ("17 0001 0001 0002 007a f4" + 244 * "00", RequestFault.QUANTITY, 122, 2),
     ("06 0007", RequestFault.QUANTITY, 3, 7),
     ("06", RequestFault.QUANTITY, 1, None),

@@ -67,3 +67,10 @@ def test_the_bank_is_told_whether_what_was_refused_wanted_to_write(function: int
     answer(bytes((function, 0)), bank, PEER)
     refuse_unit((9, bytes((function, 0, 4, 0, 1))), (1,), bank, PEER)
     assert told == [function in (5, 6, 15, 16, 22, 23)] * 2
+
+
+def test_a_master_is_its_address_or_what_its_certificate_says_and_never_both() -> None:
+    """All plain masters under one name would be one owner."""
+    plain, other, named = Peer("10.0.0.5", 5), Peer("10.0.0.6", 5), Peer("10.0.0.5", 6, "cell")
+    assert [each.identity for each in (plain, other, named)] == ["10.0.0.5", "10.0.0.6", "certificate cell"]
+    assert [str(each) for each in (plain, named)] == ["10.0.0.5:5", "cell (10.0.0.5:6)"]

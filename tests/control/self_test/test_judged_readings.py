@@ -22,6 +22,7 @@ from gateway.control.self_test.judgement import (
     still_rising,
 )
 from gateway.control.self_test.measurements import Intervals, Slope
+from gateway.control.self_test.rest import judge_rest
 from gateway.control.settings import LoopTiming
 from gateway.registers.words import SelfTestVerdict
 from tests.control.self_test.test_verdicts import RIG
@@ -62,6 +63,8 @@ def test_a_cell_line_is_as_good_as_what_it_lost_and_its_longest_gap(
 
 
 def test_a_cell_line_is_told_in_readings_per_second_and_milliseconds() -> None:
+    alone = judge_cell_line(Intervals(0.01, 0.03, 2), None, RIG, 1.0).text
+    assert "2 missing, 0 unreadable" in alone, "where nobody counts the wire's messages"
     text = judge_cell_line(Intervals(0.01, 0.03, 2), WireCounts(0, 300, 1), RIG, 1.0).text
     assert text.startswith(
         "100 readings per second, 2 missing, 1 unreadable, longest gap 30 ms of 50 ms, allowed 2 % lost"
@@ -155,3 +158,9 @@ def test_a_zero_may_lie_anywhere_between_what_both_branches_keep_at_rest(
     rising, falling_ = (RationalBezier(0.0, 8.0, [at_n, 26.0, 57.0], [1.0, 1.0, 1.0]) for at_n in (-2.0, 4.0))
     known = replace(RIG, model=Bsfm(Branches(rising, falling_), LinearBlend(6.0)))
     assert judge_zero(rest_n, known).verdict is verdict
+
+
+def test_a_zero_that_moves_is_told_by_how_much_and_what_may_move_it() -> None:
+    *_, zero = judge_rest([(0.01 * k, 0.1 + 0.05 * k + 0.001 * (k % 2)) for k in range(100)], RIG)
+    assert zero.verdict is FAILED and "it moves by +5.00 N/s" in zero.text
+    assert zero.text.endswith(": cell or amplifier drifts, or something still moves the tool")

@@ -1,5 +1,7 @@
 """The floor that rests prove: right under white noise, never too high under slow noise, and nothing where nobody rests."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -80,6 +82,15 @@ def test_replicates_come_before_rests() -> None:
     assert replicate_floor_n(bench.measurements[0]) == pytest.approx(0.1, rel=0.05)
     found = find_floor(bench, white(7), None)
     assert found is not None and found.source is FloorSource.REPLICATES
+
+
+@pytest.mark.parametrize("cycle", [0, 1, 2])
+def test_rows_that_are_no_witness_are_in_no_pair_of_replicates(cycle: int) -> None:
+    volts = np.round(3.0 + np.floor(TIME_S % 20.0 / 4.0) * 0.5, 3)
+    given = measurement(TIME_S, volts, 8.5 * volts + white(7), {})
+    spoilt = (20.0 * cycle + 3.0 <= TIME_S) & (20.0 * cycle + 6.0 > TIME_S)
+    broken = replace(given, force_n=np.where(spoilt, 0.0, given.force_n), usable=given.usable & ~spoilt)
+    assert replicate_floor_n(broken) == pytest.approx(0.1, rel=0.05)
 
 
 @pytest.mark.parametrize(("known_n", "floor_n"), [((0.1, 0.3), 0.3), ((0.3, 0.1), 0.3), ((0.1, None), None)])

@@ -37,4 +37,7 @@ DEFECTS = (
     Defect("a word that was refused is called in band", "clients/templates/universal.script",
            "asked and not fg_is_word_refused and fg_are_words_taken()", "asked and fg_are_words_taken()",
            ("clients/test_in_band.py",)),
+    Defect("a Python program's heartbeat outgrows its word", "clients/templates/python.txt",
+           "self.heartbeat = (self.heartbeat + 1) & 0xFFFF\n        if self",
+           "self.heartbeat = self.heartbeat + 1\n        if self", ("clients/test_client_safety.py",)),
 )  # fmt: skip

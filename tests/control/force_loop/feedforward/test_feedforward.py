@@ -40,6 +40,18 @@ def test_a_lost_contact_leaves_the_rising_branch_and_nothing_to_correct() -> Non
     assert law.correction_v(0.0) == pytest.approx(rising.inverse(3.5)[0] - rising.inverse(2.0)[0])
 
 
+def test_where_nothing_is_pressed_there_is_nothing_to_correct() -> None:
+    """At rest, and with a force that the rig takes for none: corrected there would be volts that nobody asked for."""
+    rest = Feedforward(bsfm(), settings().limits, 0.1)
+    assert rest.applied_n == 0.0 and rest.correction_v(0.0) == 0.0
+    rest.correct(1.5, 0.0)
+    assert rest.correction_v(0.0) == 0.0
+    slight = Feedforward(bsfm(), replace(settings().limits, smallest_force_n=3.0), 0.1)
+    slight.advance(2.0, 1000.0, 0.01)
+    slight.correct(1.5, 0.0)
+    assert slight.applied_n == 2.0 and slight.correction_v(0.0) == 0.0
+
+
 def test_each_calibration_brings_its_own_limit_whatever_the_one_before_had() -> None:
     law, wide, narrow = pressing(10.0), bsfm(), replace(bsfm(1.1), limits_n=(2.0, 20.0))
     taken_n = []

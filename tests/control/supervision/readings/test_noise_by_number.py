@@ -1,6 +1,7 @@
 """How large a noise is by windows of samples, and how seldom it repeats itself, against numbers worked out by hand."""
 
 from math import cos, erf, exp, inf, log, nan, pi, sqrt, tau
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,6 +24,7 @@ from gateway.control.supervision.repeat_law import (
     seconds_to_find,
     stays,
 )
+from gateway.control.supervision.repeated_readings import RepeatedReadings
 
 
 def test_a_calibration_s_noise_is_told_without_what_rounding_adds() -> None:
@@ -186,3 +188,17 @@ def test_runs_are_forgotten_a_generation_later() -> None:
     assert runs.longest == 40000
     runs.add(65536)
     assert (runs.longest, runs._samples) == (65536, [0, 65539]) and 40000 not in runs._before
+
+
+@pytest.mark.parametrize(
+    ("windows", "counts", "is_taken"),
+    [(8, 0.5, True), (7, 0.5, False), (8, 0.75, False), (8, 1.0, False), (8, 1.3, False), (31, 0.7, True)],
+)
+def test_only_a_pool_that_is_clearly_quieter_takes_the_place_of_what_is_known(
+    windows: int, counts: float, is_taken: bool
+) -> None:
+    """Four standard errors of 0.07: of a louder one equal readings would be the rarer, and a dead cell the later found."""
+    readings, now = RepeatedReadings(), Spread(counts, 0.07, 40.0, 40.0)
+    readings._known = known = Spread(1.0, 0.02, 400.0, 400.0)
+    readings._pool = SimpleNamespace(windows=windows, spread=now)  # type: ignore[assignment]
+    assert readings._quieter_now() is (now if is_taken else known)

@@ -97,7 +97,9 @@ def test_a_stop_that_was_refused_is_not_told_as_one(window: Any) -> None:
     window.context.route("**/api/v1/session", lambda route: route.fulfill(json={"csrf": "x"}))
     window.context.route("**/command/stop", lambda route: route.fulfill(status=503, json={"error": "control is away"}))
     window.keyboard.press("Escape")
-    window.get_by_text("Not stopped from here: control is away. Use the emergency stop.").wait_for()
+    window.get_by_text("Use the emergency stop.").wait_for()
+    said = window.locator("#said").text_content()
+    assert said == "Not stopped from here: control is away. Use the emergency stop."
 
 
 def test_durations_sizes_and_limits_are_told_in_their_units(window: Any) -> None:
@@ -178,3 +180,4 @@ def test_a_token_that_is_wrong_is_told_where_it_is_typed(window: Any, page: Any)
     window.locator("#token").fill("guess")
     window.locator("#token").press("Enter")
     window.get_by_text("another token").wait_for()
+    assert window.url == f"{page.address}/login"

@@ -56,6 +56,7 @@ def test_the_tabs_that_have_made_way_for_a_stop_come_back(tabs: list[Any]) -> No
     expect(tabs[1].locator("#gone")).to_be_visible(timeout=10_000)
     for window in tabs:
         expect(window.locator("#gone")).to_be_hidden(timeout=10_000)
+    assert tabs[0].locator("#said").text_content() == "Stopped: the safe voltage is out."
 
 
 def test_what_found_no_way_out_is_given_up_and_never_sent(tabs: list[Any], control: ScriptedControl) -> None:
