@@ -162,7 +162,7 @@ SLOW = (
     "web/tabs/in_chromium/test_away_in_chromium.py",
     "web/tabs/in_chromium/test_steering_in_chromium.py",
     "web/tabs/in_chromium/test_tabs_in_chromium.py",
-    "web/tabs/in_chromium/test_many_tabs_in_chromium.py",
+    "web/tabs/in_chromium/test_stop_in_chromium.py",
     "web/tabs/test_calibrations_tab.py",
 )
 """Files of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is left to one

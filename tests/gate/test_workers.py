@@ -187,7 +187,9 @@ def test_an_interrupt_right_behind_a_fork_ends_that_worker_too(tmp_path: Path) -
 def test_an_interrupt_ends_all_workers_with_their_fixtures(tmp_path: Path) -> None:
     waits = "def test_a():\n    Path('begun').touch()\n    time.sleep(600)\n"
     run = run_in_workers(tmp_path, waits=waits)
-    while not (tmp_path / "begun").exists() and run.poll() is None:  # a run that ends early is told below, not waited for
+    while (
+        not (tmp_path / "begun").exists() and run.poll() is None
+    ):  # a run that ends early is told below, not waited for
         time.sleep(0.01)
     run.send_signal(signal.SIGINT)
     said, _ = run.communicate()

@@ -16,6 +16,7 @@ LinearizedLagInverse.
 """
 
 from dataclasses import replace
+from functools import lru_cache
 from math import exp, inf, pi, sqrt
 from typing import Final, NamedTuple
 
@@ -75,8 +76,8 @@ class LagInverse:
             SHORTEST_S * GROWTH**k for k in range(HORIZONS) if k == 0 or SHORTEST_S * GROWTH**k < longest_s
         ]
         if self._second_lag_s:
-            self._later = [lags.after(0.06 * lags_s * 1.35**k) for k in range(12)]
-            self._pulses = [_pulses(lags, horizon_s) for horizon_s in self._horizons]
+            self._later = _transitions(lags, lags_s)
+            self._pulses = _pulses_of(lags, tuple(self._horizons))
         self._wire_s = inf
         self.set_wire_time(WIRE_S)
 
@@ -192,6 +193,17 @@ def _longest_horizon_s(lags: SecondOrder) -> float:
 
 def _move(by: Transition, first_v: float, second_v: float) -> tuple[float, float]:
     return by.ff * first_v + by.fs * second_v, by.sf * first_v + by.ss * second_v
+
+
+@lru_cache(maxsize=16)  # a controller makes three of the same lags, and one more with each calibration that it takes
+def _transitions(lags: SecondOrder, lags_s: float) -> tuple[Transition, ...]:
+    """Return where what has been pushed goes by itself, at moments that are the rarer the later they are."""
+    return tuple(lags.after(0.06 * lags_s * 1.35**k) for k in range(12))
+
+
+@lru_cache(maxsize=16)
+def _pulses_of(lags: SecondOrder, horizons_s: tuple[float, ...]) -> tuple[Pulses, ...]:
+    return tuple(_pulses(lags, horizon_s) for horizon_s in horizons_s)
 
 
 def _pulses(lags: SecondOrder, horizon_s: float) -> Pulses:

@@ -34,8 +34,17 @@ PROFILE_VERBS = {
 }
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    recorder = Recorder(tmp_path_factory.mktemp("recordings"), {"rig": "demo"}, ("time_s", "command_v", "force_n"))
+    for row in range(3000):
+        recorder.append((row * 0.01, 1.0 + row % 3, 4.0 * (row % 3)))
+    recorder.close()
+    return recorder.path.read_bytes()
+
+
 @pytest.fixture
-def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recording: bytes) -> Path:
     """One file of each kind, in the working directory."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "calibration.yaml").write_bytes((PROFILES / "calibrations" / "demo.yaml").read_bytes())
@@ -44,21 +53,13 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "folder").mkdir()
     (tmp_path / "state").mkdir()
     (tmp_path / "empty").touch()
-    (tmp_path / "begun.fgr").write_bytes(whole_recording(tmp_path)[:30])
+    (tmp_path / "begun.fgr").write_bytes(recording[:30])
     (tmp_path / "report.json").write_text(json.dumps({"format": 1, "verdict": "partial", "causes": []}, indent=2))
     (tmp_path / "report.html").write_text("<!doctype html><html></html>")
     (tmp_path / "table.tdms").write_bytes(b"TDSm\x0e\x00\x00\x00\x69\x12" + bytes(40))
     for name, kind in (("pipe", "a pipe"), ("socket", "a socket"), ("zeros", "a device")):
         put(kind, tmp_path / name)
     return tmp_path
-
-
-def whole_recording(folder: Path) -> bytes:
-    recorder = Recorder(folder / "recordings", {"rig": "demo"}, ("time_s", "command_v", "force_n"))
-    for row in range(3000):
-        recorder.append((row * 0.01, 1.0 + row % 3, 4.0 * (row % 3)))
-    recorder.close()
-    return recorder.path.read_bytes()
 
 
 @pytest.mark.parametrize("verb", RECORDING_VERBS)

@@ -1,13 +1,85 @@
-"""Esc stops the force wherever the cursor is: behind a click in a report that the page shows, and where the page asks."""
+"""Esc stops the force wherever the cursor is: behind a click in a report that the page shows, where the page asks, and with
+more tabs open than a browser has connections.
+
+It has six for all tabs of the page, and the stream of each keeps one: a Stop goes out all the same. Six tabs of a real browser
+take seconds to open.
+"""
 
 import json
+from collections.abc import Iterator
 from typing import Any
 
+import pytest
+
 from tests.web.tabs.conftest import record
-from tests.web.tabs.in_chromium.test_many_tabs_in_chromium import STOP, written
 from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 from tests.web.tabs.scripted_control import ScriptedControl
 from tests.web.tabs.test_calibrations_tab import add_calibration
+
+STOP = "1000000001020000"
+CONNECTIONS = 6  # of Chromium and of Firefox, to one host by HTTP/1.1
+
+
+@pytest.fixture
+def tabs(page: Any, served: ScriptedControl, chromium: Any) -> Iterator[list[Any]]:
+    """More tabs than there are connections: each of those has its stream, and one more waits."""
+    browser = chromium.new_context()
+    opened = []
+    for _ in range(CONNECTIONS):
+        window = browser.new_page()
+        window.on("pageerror", lambda error: pytest.fail(str(error)))
+        window.goto(f"{page.address}/#configuration", wait_until="commit")
+        if len(opened) < CONNECTIONS - 1:
+            window.get_by_text("demo (simulated)").wait_for()
+        opened.append(window)
+    opened[-1].locator("#stop").wait_for()
+    opened[2].evaluate("() => { new EventSource('/events?viewer=other'); }")
+    yield opened
+    browser.close()
+
+
+def written(control: ScriptedControl) -> list[str]:
+    return [one["pdu"] for one in control.asked if one["do"] == "modbus" and not one["pdu"].startswith("03")]
+
+
+def test_esc_stops_from_each_of_them(tabs: list[Any], control: ScriptedControl) -> None:
+    """It waited in the browser without a word, until somebody closed a tab."""
+    from playwright.sync_api import expect
+
+    for window in (tabs[0], tabs[-1], tabs[2]):
+        before = written(control)
+        window.keyboard.press("Escape")
+        expect(window.locator("#said")).to_have_text("Stopped: the safe voltage is out.", timeout=10_000)
+        assert written(control) == [*before, STOP]
+
+
+def test_the_tabs_that_have_made_way_for_a_stop_come_back(tabs: list[Any]) -> None:
+    """They would show a force of before the stop until somebody loads them anew."""
+    from playwright.sync_api import expect
+
+    tabs.pop().close()
+    tabs[0].keyboard.press("Escape")
+    expect(tabs[1].locator("#gone")).to_be_visible(timeout=10_000)
+    for window in tabs:
+        expect(window.locator("#gone")).to_be_hidden(timeout=10_000)
+    assert tabs[0].locator("#said").text_content() == "Stopped: the safe voltage is out."
+
+
+def test_what_found_no_way_out_is_given_up_and_never_sent(tabs: list[Any], control: ScriptedControl) -> None:
+    """It pressed when somebody closed another tab, minutes later."""
+    begin = """async () => {
+      const { api } = await import("/static/api.js");
+      const asked = [api.post("/api/v1/command/enable", { force_n: 12 }), api.post("/api/v1/calibrate/start")];
+      globalThis.said = Promise.all(asked.map((one) => one.then(() => "begun", (error) => error.message)));
+    }"""
+    tabs[0].evaluate("() => { for (let n = 0; n < 6; n++) new EventSource('/events?viewer=other' + n); }")
+    tabs[1].clock.install()
+    tabs[1].evaluate(begin)
+    tabs[1].clock.fast_forward(5_000)
+    said = tabs[1].evaluate("() => globalThis.said")
+    tabs[0].close()
+    assert said == 2 * ["no answer within 5 s: are many tabs of this page open?"]
+    assert written(control) == [] and not control.count("calibrate")
 
 
 def test_esc_stops_also_behind_a_click_in_a_report(page, served: ScriptedControl, state, chromium) -> None:
