@@ -250,6 +250,8 @@ class Admission:
             self.held_enables.note_refused_beat(write.host, frame.heartbeat)
 
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
+        if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
+            self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
         offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
         if HEARTBEAT in offsets:
             self.held_enables.hear(write.host, heartbeat)

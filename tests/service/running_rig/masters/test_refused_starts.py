@@ -215,3 +215,19 @@ def test_behind_a_restart_no_program_begins_that_hung_while_it_was_refused_and_a
             rig.run(0.05)
     assert (rig.state in MOVING) is (face == "a person")
     assert bool(answers[-1]) is (face != "a person")
+
+
+def test_who_hung_and_was_taken_over_from_presses_nothing_in_the_next_process() -> None:
+    """It died a moment later, before a frame of it could be refused."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(_control(LeaseAction.HOLD)).run(0.5)
+    Handover({}, record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+    rig.beats = False
+    frame = ENABLE, 1200, 0, 0, BEAT
+    rig.write(0, *frame, peer=HUNG)
+    rig.run(0.1).write(0, ENABLE | TAKE, 500, 0, 0, 99, peer=PAGE)
+    again = SmallRig(_control(LeaseAction.HOLD)).run(0.5)
+    Handover(kept | {"owner": "web"}, record=False).restore_held(again.bank, again.now(), lambda **facts: None, 99)
+    refused = again.answer(0, *frame, peer=HUNG)
+    assert refused and refused.reason is STALE and again.state is State.OFF
+    assert again.answer(0, *frame[:4], BEAT + 1, peer=HUNG) is None
