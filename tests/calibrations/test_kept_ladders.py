@@ -1,6 +1,7 @@
 """Ladders of calibrations that are in use, would come back or stand in a slot are measured data: no retention takes them."""
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,8 @@ def test_the_ladders_of_what_is_in_use_of_the_one_before_and_of_slots_stay(tmp_p
     store = CalibrationStore(tmp_path)
     for _ in range(5):
         record(tmp_path, days_ago=1_000.0)
-    os.utime(record(tmp_path))
+    ended_s = time.time() - 2 * 86400.0  # by which the clock is believed
+    os.utime(record(tmp_path), (ended_s, ended_s))
     unused, slotted, before, used = made_from(store, 5, *(f"recording {k:04d}.fgr: 60 stairs" for k in (1, 2, 3, 4)))
     store.use(slotted, slot=2)
     store.use(before)

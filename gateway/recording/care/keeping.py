@@ -1,8 +1,9 @@
 """Which recordings may go: not one that somebody keeps, nor the rig's reference, nor one that is being recorded.
 
 Whoever records holds a lock on the file; the kernel ends it with the process. What is kept has a file NNNN.keep beside it.
-A recording whose time is still to come was made before the clock was set back: nobody knows its age, and it stands behind the
-one that has the number before it. Otherwise such ones would have stayed for a year, say, and every new one gone at once.
+A recording whose time is still to come was made before the clock was set back, one of before 2020 by a clock that nobody had
+set: nobody knows their age, and they stand behind the one that has the number before. Otherwise such ones would have stayed for
+a year, say, and every new one gone at once; or what was recorded right behind a power cut would have gone before all others.
 """
 
 import contextlib
@@ -98,7 +99,7 @@ def _with_ends(paths: list[Path], now_s: float) -> Iterator[tuple[float, os.stat
     """With the time at which each ended, as far as the clock of now goes along with it. paths: by number."""
     ended_s = -inf
     for status, path in _statuses(paths):
-        ended_s = status.st_mtime if status.st_mtime <= now_s + CLOSED_S else ended_s
+        ended_s = status.st_mtime if CLOCK_SET_S <= status.st_mtime <= now_s + CLOSED_S else ended_s
         yield ended_s, status, path
 
 

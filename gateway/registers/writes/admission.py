@@ -32,7 +32,7 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, StartFrame
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, LastTares, StartFrame
 from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
@@ -94,6 +94,7 @@ class Admission:
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
+        self._last_tares = LastTares()
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -139,7 +140,9 @@ class Admission:
         )
         command = command._replace(has_waited=write.has_waited, repeats=repeats)
         self._ask(command, permitted.values, write)
-        self._check_starts(command, commands.address(write.block, CONTROL_WORD))
+        word_at = commands.address(write.block, CONTROL_WORD)
+        self._check_tare(command, word_at, brings_beat=HEARTBEAT in self._offsets(write))
+        self._check_starts(command, word_at)
         self._hear(write, asked, heartbeat)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
@@ -149,7 +152,9 @@ class Admission:
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
+        """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
+        if admitted.command.control_word & ControlBit.TARE:
+            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat)
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
@@ -244,12 +249,16 @@ class Admission:
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
             frame, asks = self._frame(write, values, word), bool(word & STARTS)
+            if reason is RefusalReason.TARE_REFUSED and frame.heartbeat is not None:
+                self._last_tares.note(write.host, frame.heartbeat)
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
             self.held_enables.note_refused_beat(write.host, frame.heartbeat)
 
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
+        if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
+            self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
         offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
         if HEARTBEAT in offsets:
             self.held_enables.hear(write.host, heartbeat)
@@ -285,6 +294,14 @@ class Admission:
         cure = "write control_word with bit 3 to take over" if may_take_over else "this rig names its owner"
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
+
+    def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
+        if not (brings_beat and self._rules.has_lease and command.control_word & ControlBit.TARE):
+            return
+        if self._last_tares.repeats(command.peer, command.heartbeat):
+            self.held_enables.note_lost(command.peer, command.heartbeat)
+            text = f"tare refused: heartbeat = {command.heartbeat} as at its last one: write another value with it"
+            raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 
     def _check_starts(self, command: Command, word_at: int) -> None:
         host, written = command.peer, int(command.control_word)

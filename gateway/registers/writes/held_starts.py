@@ -68,6 +68,25 @@ class _Refused(NamedTuple):
         return frame.heartbeat == self.heartbeat or frame.data == self.frame.data
 
 
+class LastTares:
+    """The heartbeat beside each host's last tare, taken or refused: of a program that stands still the same one comes on and
+    on, and whatever lies on the tool by then would become the zero."""
+
+    def __init__(self) -> None:
+        self._beats: dict[str, int] = {}
+
+    def note(self, host: str, heartbeat: int) -> None:
+        """Note a tare, and the heartbeat that came with it."""
+        self._beats.pop(host, None)
+        self._beats[host] = heartbeat
+        if len(self._beats) > _MOST_HOLDERS:
+            del self._beats[next(iter(self._beats))]
+
+    def repeats(self, host: str, heartbeat: int) -> bool:
+        """Decide whether this host has brought this heartbeat with its last tare."""
+        return self._beats.get(host) == heartbeat
+
+
 class HeldEnables:
     """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
     all of them, of other times of the same ones once a second. has_lease: a heartbeat has to change; else none is noted. lost:

@@ -45,8 +45,8 @@ class Cell:
         return b"".join(one if self.block == "float_abcd" else one[2:] + one[:2] for one in floats)
 
     def write(self, rig: SmallRig) -> Refusal | None:
-        """Write as the owner; the refusal, where it is one. Each cell stands by itself: no other was refused before."""
-        rig.bank.held_enables.let_go(OWNER.identity)
+        """Write as the owner; the refusal, where it is one."""
+        _forget_others(rig)
         try:
             if self.block == "coils":
                 rig.bank.write_bits(0, [bool(int(self.values[0]) >> k & 1) for k in range(7)], OWNER)
@@ -59,7 +59,7 @@ class Cell:
 
     def outcome(self, rig: SmallRig) -> object:
         """What the bank would store and hand on, without doing it: equal ones have one future. Raises Refusal."""
-        rig.bank.held_enables.let_go(OWNER.identity)
+        _forget_others(rig)
         name = "command" if self.block == "coils" else self.block
         block = next(one for one in rig.bank._map.blocks if one.name == name)
         data = pack(">H", int(self.values[0])) if self.block == "coils" else self.data
@@ -70,6 +70,12 @@ class Cell:
         assert admitted is not None
         return (tuple(round(value, 4) for value in admitted.values[:13]), *admitted[1:2], admitted.command.control_word,
                 *admitted[3:])  # fmt: skip
+
+
+def _forget_others(rig: SmallRig) -> None:
+    """No other cell's write was before this one."""
+    rig.bank.held_enables.let_go(OWNER.identity)
+    rig.bank._admission._last_tares.note(OWNER.identity, -1)
 
 
 def cells(stands_n: float) -> Iterator[Cell]:

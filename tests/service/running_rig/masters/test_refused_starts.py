@@ -19,7 +19,7 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import ENABLE, OWNER, RESET, SELF_TEST, TAKE, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OWNER, RESET, SELF_TEST, TAKE, TARE, SmallRig
 
 HUNG, PAGE, LEASE_S, BEAT = Peer("10.0.0.9"), Peer("web"), 0.35, 7
 MOVING = State.READY, State.RAMPING, State.HOLDING, State.CALIBRATING
@@ -215,3 +215,56 @@ def test_behind_a_restart_no_program_begins_that_hung_while_it_was_refused_and_a
             rig.run(0.05)
     assert (rig.state in MOVING) is (face == "a person")
     assert bool(answers[-1]) is (face != "a person")
+
+
+def test_who_hung_and_was_taken_over_from_presses_nothing_in_the_next_process() -> None:
+    """It died a moment later, before a frame of it could be refused."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(_control(LeaseAction.HOLD)).run(0.5)
+    Handover({}, record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+    rig.beats = False
+    frame = ENABLE, 1200, 0, 0, BEAT
+    rig.write(0, *frame, peer=HUNG)
+    rig.run(0.1).write(0, ENABLE | TAKE, 500, 0, 0, 99, peer=PAGE)
+    again = SmallRig(_control(LeaseAction.HOLD)).run(0.5)
+    Handover(kept | {"owner": "web"}, record=False).restore_held(again.bank, again.now(), lambda **facts: None, 99)
+    refused = again.answer(0, *frame, peer=HUNG)
+    assert refused and refused.reason is STALE and again.state is State.OFF
+    assert again.answer(0, *frame[:4], BEAT + 1, peer=HUNG) is None
+
+
+def test_the_tare_of_a_program_that_hung_is_taken_once() -> None:
+    """The robot laid the tool down, and its 10 N became the zero: 20 N were held by the registers, and 30 N by the cell."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(_control(LeaseAction.FAULT)).run(1.0)
+    Handover({}, record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+    rig.beats, read_n = False, rig.plant.reading_n
+    rig.write(0, TARE, 0, 0, 0, BEAT, peer=HUNG)
+    rig.plant.reading_n = lambda: read_n() + 10.0  # type: ignore[method-assign]
+    for _ in range(40):
+        refused = rig.run(0.05).answer(0, TARE, 0, 0, 0, BEAT, peer=HUNG)
+        assert refused
+    assert refused.reason is STALE and abs(rig.controller.zero_n) < 0.5
+    again = SmallRig(_control(LeaseAction.FAULT)).run(1.0)
+    Handover(dict(kept), record=False).restore_held(again.bank, again.now(), lambda **facts: None)
+    assert again.answer(0, TARE, 0, 0, 0, BEAT, peer=HUNG), "nor behind a restart"
+    rig.write(0, TARE, 0, 0, 0, BEAT + 1, peer=HUNG)
+    assert rig.controller.zero_n > 9.5, "a program that goes on means it"
+    for _ in range(2):
+        rig.run(1.0).write(0, TARE, peer=PAGE)  # a person has no heartbeat
+
+
+def test_a_tare_that_was_refused_is_not_taken_from_a_program_that_hung_meanwhile() -> None:
+    rig = SmallRig(_control(LeaseAction.FAULT)).holding(30.0)
+    rig.write(0, 0)
+    answers = [rig.run(0.05).answer(0, TARE, 0, 0, 0, BEAT, peer=HUNG) for _ in range(60)]
+    assert [refused.reason for refused in answers if refused][:1] == [RefusalReason.TARE_REFUSED]
+    assert all(answers) and answers[-1] and answers[-1].reason is STALE
+    assert rig.answer(0, TARE, 0, 0, 0, BEAT + 1, peer=HUNG) is None
+
+
+def test_without_a_lease_a_tare_needs_no_other_heartbeat() -> None:
+    rig = SmallRig(settings()).run(1.0)
+    for _ in range(2):
+        rig.write(0, TARE, 0, 0, 0, BEAT)
+    assert rig.state is State.OFF

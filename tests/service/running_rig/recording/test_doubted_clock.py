@@ -10,6 +10,7 @@ from gateway.profiles.recordings_section import Retention
 from gateway.recording import Recorder, recording_paths
 from gateway.recording.care import clock_doubt
 from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
+from gateway.recording.care.keeping import choose_prunable
 from gateway.service.running_rig.recording import retention as module
 from gateway.service.running_rig.recording.retention import RecordingRetention
 from tests.recording.care.test_care import NOW_S, record
@@ -164,3 +165,12 @@ def test_of_hours_that_are_kept_the_older_ones_go_while_the_clock_goes_along(
     for hours_ago in (8.0, 5.0, 1.0):
         record(tmp_path, days_ago=hours_ago / 24.0)
     assert Machine(tmp_path, Retention(days=0.25), monkeypatch).prune(0.0) == ["0001"]
+
+
+def test_what_was_recorded_before_anybody_had_set_the_clock_goes_in_its_turn(tmp_path: Path) -> None:
+    """Behind a power cut, on a machine whose clock begins in 1970: it went first, before what was ten days old."""
+    paths = [record(tmp_path, days_ago=days_ago) for days_ago in (10.0, 5.0, 1.0)]
+    os.utime(paths[2], (3600.0, 3600.0))
+    limit = Retention(days=90.0, bytes=1_000_000)
+    object.__setattr__(limit, "bytes", 2 * paths[0].stat().st_size)
+    assert [one.path for one in choose_prunable(paths, limit, "", NOW_S)] == paths[:1]
