@@ -27,7 +27,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(TriedAgain(lambda nodeid: nodeid.removeprefix("tests/").startswith(WITH_A_CLOCK)))
     draw_examples(at_random=config.getoption("--long"))
     if workers := config.getoption("--workers"):
-        config.pluginmanager.register(ForkedWorkers(workers, group_of))
+        config.pluginmanager.register(ForkedWorkers(workers, group_of, IN_REAL_TIME))
     gc.disable()  # until all tests are collected, of which none is garbage
 
 
@@ -117,7 +117,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--long", action="store_true", help="the same tests with a bigger budget: seeds, kills, fuzz, soak"
     )
     parser.addoption(
-        "--workers", type=int, default=0, help="so many processes share the tests; 0: one runs all, in order"
+        "--workers",
+        type=int,
+        default=0,
+        help="processes that share the tests that wait for no clock; 0: one runs all, in order",
     )
 
 

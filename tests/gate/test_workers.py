@@ -114,9 +114,9 @@ def test_all_but_a_fixture_that_went_well_is_told(one: Any, is_told: bool) -> No
     assert is_needed(one) is is_told
 
 
-def run_in_workers(folder: Path, *words: str, **files: str) -> subprocess.Popen[str]:
+def run_in_workers(folder: Path, *words: str, conftest: str = CONFTEST, **files: str) -> subprocess.Popen[str]:
     """Begin to run test files of this text in two workers."""
-    (folder / "conftest.py").write_text(CONFTEST)
+    (folder / "conftest.py").write_text(conftest)
     for name, text in files.items():
         (folder / f"test_{name}.py").write_text("import os, signal, time\nfrom pathlib import Path\n" + text)
     (folder / "interrupted.py").write_text(INTERRUPTED)
@@ -142,6 +142,21 @@ def test_each_test_runs_once_in_its_group_s_worker_and_what_fails_is_told(tmp_pa
     assert run.returncode == 1 and "1 failed, 5 passed" in said
     assert re.search(r"AssertionError: assert 'worker[12]' == 'no'", said) and said.count("said\n") == 1
     assert {path.name for path in tmp_path.glob("ended-*")} >= {f"ended-{pid}" for *_, pid in ran}
+
+
+def test_a_group_that_waits_has_a_worker_beside_those_that_have_something_to_do(tmp_path: Path) -> None:
+    """Of as many workers as cores one that waits would leave a core idle; where nothing waits, more hinder each other."""
+    waits = (
+        "def test_a():\n    for _ in range(100):\n        if Path('done').exists(): return\n        time.sleep(0.005)\n"
+    )
+    conftest = CONFTEST.replace("ForkedWorkers(2, ", "ForkedWorkers(1, ").replace("[0]))", '[0], ["test_a_waits.py"]))')
+    told = []
+    for text in (conftest, conftest.replace("test_a_waits", "test_nothing")):
+        files = {"a_waits": waits + "    assert False, 'alone'\n", "does": "def test_b(): Path('done').touch()\n"}
+        run = run_in_workers(tmp_path, conftest=text, **files)
+        told.append(run.communicate()[0])
+        (tmp_path / "done").unlink()
+    assert "2 passed" in told[0] and "alone" in told[1]
 
 
 def test_a_worker_that_dies_fails_its_test_and_another_one_goes_on_behind_it(tmp_path: Path) -> None:

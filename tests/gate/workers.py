@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from mmap import mmap
 from multiprocessing.connection import Connection, Pipe, wait
@@ -134,10 +134,11 @@ class Worker(NamedTuple):
 
 
 class ForkedWorkers:
-    """Runs what is collected in `count` processes, each group (`group_of` a test's id) in one of them, in its order."""
+    """Runs what is collected in `count` processes, each group (`group_of` a test's id) in one of them, in its order. Each group
+    of `waiting`, which leaves its core to others, has one more."""
 
-    def __init__(self, count: int, group_of: Callable[[str], str]) -> None:
-        self._count, self._group_of = count, group_of
+    def __init__(self, count: int, group_of: Callable[[str], str], waiting: Collection[str] = ()) -> None:
+        self._count, self._group_of, self._waiting = count, group_of, waiting
         self._workers: dict[Connection, Worker] = {}
         self._groups: dict[str, list[int]] = {}
         self._started = 0
@@ -157,7 +158,8 @@ class ForkedWorkers:
         os.close(filling)
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  # one for all
         try:
-            for _ in range(min(self._count, len(self._groups))):
+            count = self._count + sum(group in self._waiting for group in self._groups)
+            for _ in range(min(count, len(self._groups))):
                 self._start(session, [])
             self._listen(session)
         finally:
