@@ -15,12 +15,14 @@ import psutil
 import pytest
 
 from gateway.codes.warning_bits import WarningBit
+from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.profiles import shipped_profiles_folder
 from gateway.registers.residual_cause import ResidualCause
 from tests.end_to_end.conftest import RunningGateway, start, stop
 from tests.end_to_end.test_lean_processes import HEAVY, mapped
 
 WARNING_WORD, RESIDUAL_CAUSE = 111, 129
+LOOP_HZ = 100.0
 
 
 def ask(path: Path, request: dict[str, Any]) -> dict[str, Any]:
@@ -118,7 +120,7 @@ def test_a_control_that_is_killed_writes_on_in_the_same_ring_and_the_watch_stays
 def test_a_dead_watch_is_started_again_and_control_does_not_notice(watched):
     watched.write(0, 1, 1500)
     watched.wait_until(lambda status: status["state"] == 3)
-    missed, guardian = health(watched)["missed_ticks"], psutil.Process(watched.process.pid)
+    missed, guardian = missed_of_its_own(watched), psutil.Process(watched.process.pid)
     (watch,) = watches_of(guardian)  # another one than at the start where this is tried again
     watch.send_signal(signal.SIGKILL)
     watched.said("A346 the residual watch ended (signal 9): it is started again in 5 s")
@@ -128,7 +130,16 @@ def test_a_dead_watch_is_started_again_and_control_does_not_notice(watched):
         assert time.monotonic() < deadline_s
         time.sleep(0.1)
     assert watched.status()["state"] == 3
-    assert health(watched)["missed_ticks"] - missed < 20
+    assert missed_of_its_own(watched) - missed < 20
+
+
+def missed_of_its_own(running: RunningGateway) -> float:
+    """Ticks that control has missed, without those for which it waited for a processor: other tests, browsers among them, run
+    beside this one. That the watch takes none from it is asked above, by its priority."""
+    counters = SchedulerCounters(running.ready["pids"]["control"])
+    waited_s = counters.waited_s() or 0.0
+    counters.close()
+    return float(health(running)["missed_ticks"]) - LOOP_HZ * waited_s
 
 
 def watches_of(guardian):
