@@ -245,3 +245,14 @@ def test_a_shorter_set_is_committed_whatever_another_master_has_left_behind_it(b
     bench.write(COMMIT_AT, 1)
     bench.run()
     assert bench.status is CommitStatus.COMMITTED and bench.active_slot == FIRST[2]
+
+
+def test_a_commit_that_is_refused_leaves_the_words_to_who_has_staged_them(bench: Bench) -> None:
+    for address, part in requests_of(staged(CoefficientSet.of_calibration(FIRST[1]), slot=FIRST[2])):
+        bench.bank.write_registers(address, part, FIRST[0])
+    with pytest.raises(Refusal) as refused:
+        bench.bank.write_registers(COMMIT_AT - 1, struct.pack(">2H", SECOND[2], 1), SECOND[0])
+    assert refused.value.reason is RefusalReason.BUSY
+    bench.bank.write_registers(COMMIT_AT, struct.pack(">H", 1), FIRST[0])
+    bench.run()
+    assert bench.status is CommitStatus.COMMITTED and bench.active_slot == FIRST[2]

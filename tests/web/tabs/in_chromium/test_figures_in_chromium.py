@@ -3,10 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
 from gateway.live.live_state import LiveAlarm, LiveLine, LiveLoop, LiveState
-from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 
 SAMPLES = """async () => {
   const { samples } = await import("/static/live/samples.js");
@@ -74,14 +71,6 @@ TREND = """async ({ columns, tolerance_n }) => {
   trend.draw();
   return plot.chart.data.map((one) => Array.from(one));
 }"""
-
-
-@pytest.fixture
-def window(page: Any, chromium: Any) -> Any:
-    """A page to which nothing comes but what a test tells it."""
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    return open_tab(browser, page.address, "live")
 
 
 def state(**facts: Any) -> dict[str, Any]:

@@ -2,10 +2,6 @@
 
 from typing import Any
 
-import pytest
-
-from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
-
 FRAME = """async () => {
   const { api, tell } = await import("/static/api.js");
   const asked = [];
@@ -74,14 +70,6 @@ MOUNT = """async ({ tab, answers, presses }) => {
   }
   return { told, frames: [...element.querySelectorAll("iframe")].map((one) => one.getAttribute("src")) };
 }"""
-
-
-@pytest.fixture
-def window(page: Any, chromium: Any) -> Any:
-    """A page to which nothing comes but what a test tells it."""
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    return open_tab(browser, page.address, "wiring")
 
 
 def test_only_the_page_that_commands_keeps_the_force_up_about_once_a_second(window: Any) -> None:

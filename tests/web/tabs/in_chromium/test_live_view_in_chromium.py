@@ -4,10 +4,7 @@ tool that pulls, too: forces as the cell reads them, and the setpoint and the er
 from dataclasses import replace
 from typing import Any
 
-import pytest
-
 from gateway.live.live_state import LiveAlarm, LiveState
-from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 
 SAID = """async () => {
   const { api } = await import("/static/api.js");
@@ -125,14 +122,6 @@ PULLED = """async () => {
 }"""
 
 
-@pytest.fixture
-def window(page, chromium) -> Any:
-    """A page to which nothing comes but what a test tells it."""
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    return open_tab(browser, page.address, "wiring")
-
-
 def state(**facts: Any) -> LiveState:
     return LiveState(
         **({"rig": "demo", "simulated": True, "version": "0", "time_unix_s": 100.0, "state": "fault"} | facts)
@@ -192,11 +181,8 @@ def test_a_gateway_that_is_away_is_told_in_our_words(window) -> None:
     assert window.evaluate(UNREACHED) == ["no answer from the gateway"] * 2
 
 
-def test_setpoint_error_and_range_go_with_the_pull(page, chromium) -> None:
+def test_setpoint_error_and_range_go_with_the_pull(window) -> None:
     """Its trend stood still while a tool pulled, for the ring held no row of it."""
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    window: Any = open_tab(browser, page.address, "wiring")
     drawn = window.evaluate(PULLED)
     assert (drawn["low"], drawn["wanted"], drawn["high"]) == (-13.0, -12.0, -11.0)
     assert (drawn["force"], drawn["pushed"]) == (-11.8, 12.0)
@@ -204,4 +190,3 @@ def test_setpoint_error_and_range_go_with_the_pull(page, chromium) -> None:
     assert drawn["least"] == -15.0
     assert drawn["units"] == ["N measured", "N, pulling", "N, −measured − setpoint", "V"]  # -14.91, 15.00, -0.09
     assert drawn["model"] == "The tool pulls; the model drawn is that of pushing."
-    browser.close()
