@@ -1,6 +1,6 @@
 """Which frames count in noise and behind a silence, and what may hide one: claims of units, known or not, and their ends."""
 
-from itertools import product
+from itertools import pairwise, product
 
 import pytest
 
@@ -11,7 +11,7 @@ from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuReq
 from tests.modbus.host_answers import loopback_request
 from tests.modbus.rtu_bus import SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered, registers_answer
-from tests.modbus.test_rtu_receiver_limits import known
+from tests.modbus.test_rtu_receiver_limits import MANY, known
 
 ODD = b"\x41\x01\x02"  # of a function that nobody knows: its checksum alone tells its end
 
@@ -163,3 +163,12 @@ def test_a_request_behind_a_frame_of_another_that_was_cut_off_waits_for_its_rest
     bus = known(7).send(INSIDE[:5], pause_s=0.005)
     begin_s = bus.now_s
     assert bus.send(OURS).pause(1.0).heard == [(begin_s + SPLIT_S, RtuRequest(1, READ, True))]
+
+
+def test_a_frame_whose_pieces_all_come_late_has_its_time_only_in_more_than_ten() -> None:
+    """A program that was late each time has heard ten pieces and no more, whatever it says of when they came."""
+    for pieces, heard in ((10, answered(MANY)), (11, [])):
+        frame = encode_adu(1, MANY)
+        cuts = [*range(pieces), len(frame)]
+        bus = Bus(baud=115200).send(*(frame[at:end] for at, end in pairwise(cuts)), pause_s=0.0195)
+        assert bus.requests() == heard, pieces

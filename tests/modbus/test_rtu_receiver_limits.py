@@ -58,7 +58,8 @@ def test_a_frame_across_a_silence_does_not_hide_the_request_behind_it() -> None:
     """Noise and the first byte of our request are a refusal of another unit, with its checksum."""
     refusals = (encode_adu(unit, bytes((0x83, code))) for unit in range(2, 248) for code in range(1, 12))
     made = next(frame for frame in refusals if frame[-1] == OURS[0])[:-1]
-    assert Bus().send(made, OURS, pause_s=0.006).requests() == answered()
+    bus = Bus().send(made, OURS, pause_s=0.006)
+    assert bus.requests() == answered() and (bus.receiver.frames, bus.receiver.noise_bytes) == (1, len(made))
 
 
 def test_a_request_inside_of_another_s_frame_behind_noise_is_none() -> None:
