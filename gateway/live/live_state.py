@@ -126,11 +126,13 @@ class LiveLimits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveResidual:
-    """What the residual watch says. effect: name of the cause, `none` where the plant explains all."""
+    """What the residual watch says. effect: name of the cause, `none` where the plant explains all; why_skipped: why the newest
+    window could not be judged."""
 
     cause: int = 0
     effect: str = "none"
     sentence: str = ""
+    why_skipped: str = ""
     age_s: float | None = None
 
 

@@ -277,9 +277,8 @@ def _recording(status: Answer) -> live.LiveRecording:
 
 
 def _residual(status: Answer) -> live.LiveResidual:
-    return live.LiveResidual(
-        cause=status["cause"], effect=status["name"], sentence=status.get("sentence", ""), age_s=status["age_s"]
-    )
+    said = {key: status.get(key, "") for key in ("sentence", "why_skipped")}
+    return live.LiveResidual(cause=status["cause"], effect=status["name"], age_s=status["age_s"], **said)
 
 
 def _writers(loop: ControlLoop, now_s: float) -> dict[str, live.LiveWriter]:

@@ -88,12 +88,14 @@ class CalibrateRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResidualRequest:
-    """Report of the residual watch; without a cause it is a question. worse: what the plant in use has made worse."""
+    """Report of the residual watch; without a cause it is a question. worse: what the plant in use has made worse;
+    why_skipped: why it could not judge the newest window."""
 
     __pydantic_config__ = _STRICT
     cause: Number | None = None
     sentence: str = ""
     worse: str = ""
+    why_skipped: str = ""
     counters: dict[str, Any] = field(default_factory=dict)
 
 

@@ -26,7 +26,7 @@ class WatchReports:
         self._loop = loop
         self._clock = clock
         self._log = log
-        self._sentence = ""
+        self._sentence = self._why_skipped = ""
         self._counters: dict[str, float] = {}
         self._warnings = 0
         self._heard_s: float | None = None
@@ -44,7 +44,8 @@ class WatchReports:
         if report.cause is not None:
             self._hear(report.cause, report)
         number, since_s = self._plant
-        return self.figures() | {"sentence": self._sentence, "plant": number, "plant_since_s": since_s}
+        said = {"sentence": self._sentence, "why_skipped": self._why_skipped}
+        return self.figures() | said | {"plant": number, "plant_since_s": since_s}
 
     def figures(self) -> Answer:
         """Return cause by number and name, how often a warning rose, the watch's counters, and the age of it all."""
@@ -58,7 +59,7 @@ class WatchReports:
         self._counters = _numbers(report.counters)
         self._heard_s = self._clock()
         cause, before = ResidualCause(number), self._loop.residual_cause
-        self._sentence = report.sentence[:_LONGEST_SENTENCE]
+        self._sentence, self._why_skipped = (text[:_LONGEST_SENTENCE] for text in (report.sentence, report.why_skipped))
         if cause is not before:
             self._change(cause)
         self._hear_worse(report.worse[:_LONGEST_SENTENCE])

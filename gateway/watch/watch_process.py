@@ -164,6 +164,7 @@ def _report(watch: "Watch", force: "ForceWatch", more: dict[str, float]) -> dict
         "cause": int(published.cause),
         "sentence": published.sentence,
         "worse": force.sentence,
+        "why_skipped": watch.why_skipped,
         "counters": counters,
     }
 

@@ -109,6 +109,9 @@ def test_calibration_plant_recording_run_and_residual_are_told_by_who_has_them(s
     assert (state.plant.number, state.plant.name) == (0, stage.plants.status()["name"])
     assert (state.residual.cause, state.residual.effect) == (12, "coulomb-friction")
     assert (state.residual.sentence, state.residual.age_s) == ("friction has doubled", pytest.approx(1.0, abs=0.01))
+    assert state.residual.why_skipped == ""
+    ask(stage, do="residual", cause=0, why_skipped="a fault stood")
+    assert (state_of(stage).residual.why_skipped, state_of(stage).residual.sentence) == ("a fault stood", "")
     assert state.recording.on is False and state.recording.path == ""
     assert ask(stage, do="record", on=True, name="mine")["ok"]
     stage.wired.run(0.5)

@@ -52,6 +52,16 @@ def test_repeated_words_are_logged_once_and_agreement_clears_it(wired, reports):
     assert wired.said("the model agrees")
 
 
+def test_why_nothing_was_judged_is_told_and_raises_and_logs_nothing(wired, reports):
+    before = (wired.warnings, list(wired.log))
+    reports.answer({"cause": 0, "why_skipped": "nothing was commanded" + "!" * 600})
+    told_why = reports.answer({})["why_skipped"]
+    assert told_why.startswith("nothing was commanded!") and len(told_why) == 500
+    assert (wired.warnings, wired.log) == before
+    reports.answer({"cause": 0})
+    assert reports.answer({})["why_skipped"] == ""
+
+
 def test_counters_and_age_can_be_read(wired, reports):
     assert reports.figures()["age_s"] is None
     reports.answer(told(0, "", looks=7, cpu_s=1.5, nonsense=3, rms_n=float("nan")))
@@ -71,13 +81,14 @@ def test_counters_and_age_can_be_read(wired, reports):
         {"cause": True},
         {"cause": -1},
         {"cause": 12, "sentence": 5},
+        {"cause": 12, "sentence": "", "why_skipped": 5},
         {"cause": None},
         {"cause": 12, "counters": [1, 2]},
         {"cause": 12, "caus": 12},
     ],
 )
 def test_nonsense_is_refused_and_leaves_no_trace(wired, reports, request_):
-    with pytest.raises(ValueError, match=r"cause|sentence|counters"):
+    with pytest.raises(ValueError, match=r"cause|sentence|why_skipped|counters"):
         reports.answer(request_)
     assert wired.word("residual_cause") == 0
     assert reports.figures()["age_s"] is None

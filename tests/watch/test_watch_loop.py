@@ -55,7 +55,7 @@ class Scene:
         number = self.made
         published = WindowVerdict(ResidualCause.NONE, "")
         watch = SimpleNamespace(
-            counters={}, published=published, check_newest_window=lambda: self.note(f"look {number}")
+            counters={}, published=published, why_skipped="", check_newest_window=lambda: self.note(f"look {number}")
         )
         force = SimpleNamespace(sentence="", follow=self.followed.append)
         force.look = lambda rows, columns: self.look_at_force(force, number)

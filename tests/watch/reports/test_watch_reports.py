@@ -17,10 +17,14 @@ from tests.service.rigs import demo
 def test_what_is_no_number_is_not_told() -> None:
     """JSON has none: control would refuse the whole report, and the warning with it."""
     watch: Any = SimpleNamespace(
-        counters={"looks": 3, "rms_n": nan}, published=WindowVerdict(ResidualCause.UNKNOWN, "x")
+        counters={"looks": 3, "rms_n": nan},
+        published=WindowVerdict(ResidualCause.UNKNOWN, "x"),
+        why_skipped="a fault stood",
     )
     force: Any = SimpleNamespace(sentence="")
-    assert _report(watch, force, {"memory_mb": inf, "cpu_s": 1.0})["counters"] == {"looks": 3, "cpu_s": 1.0}
+    report = _report(watch, force, {"memory_mb": inf, "cpu_s": 1.0})
+    assert report["counters"] == {"looks": 3, "cpu_s": 1.0}
+    assert (report["sentence"], report["why_skipped"]) == ("x", "a fault stood")
 
 
 def test_a_plant_is_in_use_since_control_says_so() -> None:

@@ -92,7 +92,8 @@ export function makeAlarms(api) {
     clear: () => notes.replaceChildren(),
     state(state) {
       none.hidden = state.faults.length + state.warnings.length > 0;
-      residual.textContent = state.residual.sentence ? `Residual watch: ${state.residual.sentence}` : "";
+      const { sentence, why_skipped: why } = state.residual;
+      residual.textContent = sentence || why ? `Residual watch: ${sentence || `not judged: ${why}`}` : "";
       const key = JSON.stringify([state.faults, state.warnings]);
       if (key !== shown) {
         // else a button that is about to be pressed stays where it is

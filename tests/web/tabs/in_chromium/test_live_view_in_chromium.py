@@ -4,7 +4,7 @@ tool that pulls, too: forces as the cell reads them, and the setpoint and the er
 from dataclasses import replace
 from typing import Any
 
-from gateway.live.live_state import LiveAlarm, LiveState
+from gateway.live.live_state import LiveAlarm, LiveResidual, LiveState
 
 SAID = """async () => {
   const { api } = await import("/static/api.js");
@@ -150,6 +150,24 @@ ACKNOWLEDGED = """async (state) => {
   for (const button of alarms.element.querySelectorAll("button")) button.click();
   return asked;
 }"""
+
+
+WATCHED = """async (states) => {
+  const { makeAlarms } = await import("/static/live/health.js");
+  const alarms = makeAlarms({ on: () => {} });
+  return states.map((state) => (alarms.state(state), alarms.element.querySelector(":scope > p:last-of-type").textContent));
+}"""
+
+
+def test_the_watch_says_what_differs_or_why_it_does_not_judge(window) -> None:
+    """Beside a rig at rest an empty line could mean that all is well."""
+    told = [LiveResidual(), LiveResidual(why_skipped="nothing was commanded")]
+    told.append(replace(told[1], sentence="friction has doubled"))
+    assert window.evaluate(WATCHED, [state(residual=one).to_json() for one in told]) == [
+        "",
+        "Residual watch: not judged: nothing was commanded",
+        "Residual watch: friction has doubled",
+    ]
 
 
 def test_to_acknowledge_a_fault_resets_it_and_a_warning_needs_none(window) -> None:
