@@ -152,7 +152,10 @@ def handshake_failure(error: ssl.SSLError) -> str:
         return (
             f"W240 it refused our certificate ({reason.lower()}): give the client our CA, and the name it connects to"
         )
-    return f"W244 the handshake failed: {reason.lower() or error}"
+    said = reason.lower().replace("_", " ") or error
+    return (
+        f"W244 the handshake failed ({said}): it speaks no TLS 1.2 or 1.3, or what stands between damages what it sends"
+    )
 
 
 def _doubt(code: int, message: str) -> str:

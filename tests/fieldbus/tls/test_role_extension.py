@@ -12,10 +12,12 @@ from gateway.modbus.certificate import ROLE_OID, PeerCertificate, read_certifica
 from tests.certificates import signed
 
 
-def shown_by(*roles: bytes, serial: int = 0x77, begins: datetime | None = None) -> PeerCertificate:
-    """Return what is read of a certificate with these values of the extension."""
+def shown_by(
+    *roles: bytes, serial: int = 0x77, begins: datetime | None = None, names: tuple[str, ...] = ("cell-7",)
+) -> PeerCertificate:
+    """Return what is read of a certificate with these common names and values of the extension."""
     key, ca = ec.generate_private_key(ec.SECP256R1()), signed()["ca"]
-    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "cell-7")])
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name) for name in names])
     builder = x509.CertificateBuilder(name, name, key.public_key(), serial)
     builder = builder.not_valid_before(begins or ca.certificate.not_valid_before_utc)
     builder = builder.not_valid_after(ca.certificate.not_valid_after_utc)
@@ -53,6 +55,12 @@ def test_two_roles_or_one_in_another_encoding_are_told_as_such(values: tuple[byt
     told = str(refusal_of(*values))
     assert told.startswith("W242 the certificate of 'cell-7' has a role that is not one UTF8String")
     assert "''" not in told and f"{ROLE_OID} = ASN1:UTF8String:ROLE" in told
+
+
+@pytest.mark.parametrize("names", [(), ("cell-7",), ("cell-7", "robot"), ("robot", "cell-7")])
+def test_of_several_common_names_all_count(names: tuple[str, ...]) -> None:
+    """The last one counted: two clients of one line, `CN=robot` beneath it, were one owner."""
+    assert shown_by(b"\x0c\x08setpoint", names=names).name == ", ".join(names)
 
 
 def test_an_unknown_role_is_named() -> None:
