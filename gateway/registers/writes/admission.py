@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
-from gateway.registers.command import Command, Status
+from gateway.registers.command import Channel, Command, Status
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
@@ -48,15 +48,19 @@ _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
 class Write(NamedTuple):
-    """A write of the command block. touched: bits of the control word that the master has named (coils name some);
-    has_waited: it was asked for a while ago (`Peer.is_behind`)."""
+    """A write of the command block. touched: bits of the control word that the master has named (coils name some)."""
 
     block: Block
     address: int
     data: bytes
     host: str
+    peer: Peer
     touched: int = ALL_BITS
-    has_waited: bool = False
+
+    @property
+    def sender(self) -> tuple[str, Channel]:
+        """Return who writes, and by which channel."""
+        return self.host, (self.peer.host, self.peer.port, self.address, len(self.data))
 
 
 class AdmittedWrite(NamedTuple):
@@ -115,7 +119,7 @@ class Admission:
         if asked != before[CONTROL_WORD] or values[MODE] != before[MODE]:  # else they have been found good
             commands.check_known(values, write.block)
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
-            command = commands.command(values, asked, number, now_s, write.host)
+            command = commands.command(values, asked, number, now_s, write.sender)
             self._ask(command, values, write)
             return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values, now_s)
@@ -130,7 +134,7 @@ class Admission:
         is_begun_anew = self._is_begun_anew(write.host, is_taken_over=is_taken_over)
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
-        command = commands.command(values, written, number, now_s, write.host)
+        command = commands.command(values, written, number, now_s, write.sender)
         if is_stop:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
@@ -138,7 +142,7 @@ class Admission:
         repeats = not self._is_in_use(write.host) and self.held_enables.repeats(
             write.host, self._frame(write, values, written), now_s
         )
-        command = command._replace(has_waited=write.has_waited, repeats=repeats)
+        command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)
         self._check_tare(command, word_at, brings_beat=HEARTBEAT in self._offsets(write))
@@ -164,7 +168,7 @@ class Admission:
     def _is_plain(self, write: Write, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output, it has not waited. What the checks below would find is known."""
-        is_usual = not (write.has_waited or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
+        is_usual = not (write.peer.is_behind or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
         return is_usual and self._ownership.admits(write.host) and not self._is_begun_anew(write.host)
 
     def is_usual(self, host: str) -> bool:
