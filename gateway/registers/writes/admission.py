@@ -98,7 +98,7 @@ class Admission:
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
-        self._last_tares = LastTares()
+        self._last_tares = LastTares(has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -158,7 +158,7 @@ class Admission:
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
         if admitted.command.control_word & ControlBit.TARE:
-            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat)
+            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat, admitted.command.received_s)
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
@@ -173,7 +173,7 @@ class Admission:
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        is_held = host in self.held_runs.by_host or self.held_enables.knows(host)
+        is_held = host in self.held_runs.by_host or self.held_enables.knows(host) or self._last_tares.knows(host)
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
@@ -253,8 +253,8 @@ class Admission:
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
             frame, asks = self._frame(write, values, word), bool(word & STARTS)
-            if reason is RefusalReason.TARE_REFUSED and frame.heartbeat is not None:
-                self._last_tares.note(write.host, frame.heartbeat)
+            if reason is RefusalReason.TARE_REFUSED:
+                self._last_tares.note(write.host, int(values[HEARTBEAT]), now_s)
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
@@ -263,11 +263,12 @@ class Admission:
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
             self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
-        offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
-        if HEARTBEAT in offsets:
-            self.held_enables.hear(write.host, heartbeat)
-        if CONTROL_WORD in offsets and write.touched & ENABLE & ~asked:
-            self.held_enables.let_go(write.host)
+        for held, bit in ((self.held_enables, ControlBit.ENABLE), (self._last_tares, ControlBit.TARE)):
+            offsets = self._offsets(write) if held.knows(write.host) else ()
+            if HEARTBEAT in offsets:
+                held.hear(write.host, heartbeat)
+            if CONTROL_WORD in offsets and write.touched & ~asked & bit:
+                held.let_go(write.host)
 
     # -- why not
 
@@ -300,11 +301,14 @@ class Admission:
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
-        if not (brings_beat and self._rules.has_lease and command.control_word & ControlBit.TARE):
+        host, beat, now_s = command.peer, command.heartbeat, command.received_s
+        if not command.control_word & ControlBit.TARE:
             return
-        if self._last_tares.repeats(command.peer, command.heartbeat):
-            self.held_enables.note_lost(command.peer, command.heartbeat)
-            text = f"tare refused: heartbeat = {command.heartbeat} as at its last one: write another value with it"
+        if self._last_tares.repeats(host, beat if brings_beat else None, now_s):
+            self._last_tares.note(host, beat, now_s)
+            if brings_beat:
+                self.held_enables.note_lost(host, beat)
+            text = f"tare refused: heartbeat = {beat} as at its last one: write another value with it"
             raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 
     def _check_starts(self, command: Command, word_at: int) -> None:
