@@ -94,7 +94,7 @@ class CommandTracker:
         if command.has_waited or command.repeats:
             self._lease.adopt(command.heartbeat)
         else:
-            self._lease.observe(now_s, command.heartbeat, command.peer)
+            self._lease.observe(now_s, command.heartbeat, command.peer, command.channel)
         if edges.rises & _TAKE:
             self._lease.take_over(now_s, command.peer)
         if edges.stops:
@@ -167,7 +167,7 @@ class CommandTracker:
 
     def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
-        return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer)
+        return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer, command.channel)
 
     def would_start_lease(self, command: Command) -> bool:
         """Return whether this command is a takeover with a lease of its own, were it taken now."""
@@ -175,7 +175,7 @@ class CommandTracker:
 
     def is_taken_again(self, command: Command) -> bool:
         """Return whether this takeover is one of a program that stands still: its second, without a beat between."""
-        return self._lease.is_taken_again(command.heartbeat, command.peer)
+        return self._lease.is_taken_again(command.heartbeat, command.peer, command.channel)
 
     def would_beat_since(self, since_s: float, now_s: float, command: Command) -> bool:
         """Return whether the heartbeat has changed since then and within one length of the lease, were this command taken

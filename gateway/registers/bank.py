@@ -284,7 +284,7 @@ class RegisterBank:
             self._tell(f"byte_order_echo {order.upper()}: use {self._map.name_float_block(order)}", peer)
 
     def _write_command(self, block: Block, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
-        now_s, write = self._now(), Write(block, address, data, peer.identity, touched, peer.is_behind)
+        now_s, write = self._now(), Write(block, address, data, peer.identity, peer, touched)
         admitted = self._admission.admit(write, self.command.number + 1, now_s)
         if admitted is None:
             return

@@ -4,18 +4,23 @@ Tuples, for both are made at every write or step, and a frozen dataclass of so m
 """
 
 from math import nan
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeAlias
 
 from gateway.codes.faults import FaultCode
 from gateway.registers.words import ControlBit, LimitedBy, Mode, State
 
 _NO_BIT: Final = ControlBit(0)
 
+Channel: TypeAlias = tuple[str, int, int, int]
+"""Host, port, address and bytes of a write: a master that writes in cycles has one for each of its frames."""
+NO_CHANNEL: Final = ("", 0, 0, 0)
+
 
 class Command(NamedTuple):
     """One accepted write of the command block, whole, SI units. 0 in a field that has a default of the rig means that one.
 
-    number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address.
+    number counts accepted writes (control sees a new one by it); received_s is monotonic; peer is the writer's address;
+    channel tells its frames apart.
     stops: whatever the control word was, this write wants the output off. lowered_from_n: what the master wrote as setpoint
     before a calibration with a smaller limit lowered it, 0 where none did. has_waited: it was asked for a while ago, in a pile
     of requests: its master may be long gone. repeats: no other heartbeat than when its master was refused, or in the
@@ -38,6 +43,7 @@ class Command(NamedTuple):
     number: int = 0
     received_s: float = 0.0
     peer: str = ""
+    channel: Channel = NO_CHANNEL
     stops: bool = False
     lowered_from_n: float = 0.0
     has_waited: bool = False

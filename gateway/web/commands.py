@@ -116,9 +116,13 @@ class Commands:
         await self._send(P.write_registers_request(self._find("control_word").address, bytes(2)), is_stop=True)
 
     async def take_ownership(self, viewer: str) -> None:
-        """Take the setpoint over from whoever owns it."""
+        """Take the setpoint over from whoever owns it, whose heartbeat, once more, would be no beat of the page."""
+        stops = self._stops
         await self._set_bit(ControlBit.TAKE_OWNERSHIP)
-        self._begin_to_beat(viewer)
+        words = await self.words("command")
+        if stops == self._stops:
+            self._number = words[self._find("heartbeat").address - self._find("control_word").address]
+            self._begin_to_beat(viewer)
 
     async def reset(self) -> None:
         """Reset a latched fault: with setpoint 0 and another heartbeat, all in one write. Where somebody presses again

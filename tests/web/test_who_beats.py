@@ -39,6 +39,21 @@ def test_taking_over_leaves_the_page_the_owner_and_the_one_that_beats(tmp_path: 
     play(tmp_path, scene, leased())
 
 
+def test_the_page_may_take_over_again_and_again_whatever_heartbeat_stood(tmp_path: Path) -> None:
+    """Its first was the robot's own once more, and so no beat: each later takeover was refused, as of a program that hangs."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        for beat in (1, 20):
+            stage.wired.write(0, 8, 500, 0, 0, beat)
+            await commands.take_ownership("me")
+            await let_turns_pass(20)
+            assert stage.wired.bank.owner == "web"
+            stage.wired.run(5.0)
+
+    play(tmp_path, scene, leased())
+
+
 def test_where_the_byte_order_must_be_proven_the_page_proves_it(tmp_path: Path) -> None:
     rig = replace(demo(), network=replace(demo().network, require_byte_order_echo=True))
 

@@ -15,6 +15,7 @@ from gateway.cli.errors import CliError
 from gateway.cli.force_hold.heartbeat import DEFAULT_PERIOD_S
 from gateway.cli.master.byte_order_proof import write_with_proof
 from gateway.cli.master.client import Assignment, GatewayClient, RefusedError
+from gateway.cli.master.first_heartbeat import draw_first_heartbeat
 from gateway.cli.master.refusal_text import explain_refusals
 from gateway.cli.master.wires import Wire
 from gateway.codes.faults import FaultCode
@@ -45,6 +46,7 @@ class RemoteRun:
         self._registers = [self._map.find(name) for name in _WORDS]
         self._values: list[float] = []
         self._before = ""
+        self._number = draw_first_heartbeat(0)
         self._turn = threading.Lock()
         self._ended = threading.Event()
         self._beat = threading.Thread(target=self._keep_lease, daemon=True, name="heartbeat")
@@ -64,7 +66,7 @@ class RemoteRun:
                 f"W310 a run has the output there already ({share}): wait for its end; control_word 0 ends it"
             )
         try:
-            self._command(int(ControlBit.START_CALIBRATION))
+            self._command(int(ControlBit.START_CALIBRATION), heartbeat=self._number)
         except CliError as error:
             if error.exit_code != exit_codes.DEVICE or not self._has_begun(error):
                 raise
@@ -128,21 +130,24 @@ class RemoteRun:
             self._beat.join()
         self._client.close()
 
-    def _command(self, word: int) -> None:
-        register = self._map.find("control_word")
+    def _command(self, word: int, **beside: int) -> None:
+        """Write the control word, and other registers in one request with it."""
+        named = [(self._map.find(name), value) for name, value in ({"control_word": word} | beside).items()]
         with self._turn:
-            for frame in self._client.frames([Assignment(register, register.encode(word))]):
+            for frame in self._client.frames(
+                [Assignment(register, register.encode(value)) for register, value in named]
+            ):
                 with explain_refusals(self._client, [frame]):
                     write_with_proof(self._client, frame)
 
     def _keep_lease(self) -> None:
         """Change the heartbeat until the end, or until another master commands. Whoever looks tells of a lost connection."""
-        register, beat = self._map.find("heartbeat"), 0
+        register = self._map.find("heartbeat")
         while not self._ended.wait(DEFAULT_PERIOD_S):
-            beat = (beat + 1) % 0x10000
+            self._number = (self._number + 1) % 0x10000
             try:
                 with self._turn:
-                    self._client.write_values([Assignment(register, register.encode(beat))])
+                    self._client.write_values([Assignment(register, register.encode(self._number))])
             except RefusedError:
                 return
             except CliError:

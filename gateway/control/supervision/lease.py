@@ -1,5 +1,6 @@
 """A command that expires: only a changing heartbeat value renews it; reads and repeated frames do not. Of a master whose last
-frame is sent on and on it does not change, whatever another one has written meanwhile. Who takes over has one whole length to
+frame is sent on and on it does not change, whatever another one has written meanwhile, or another frame of its own, by another
+connection or at another address: two that stand still would renew it in turn. Who takes over has one whole length to
 beat, not what the one before has left of its own. Behind a stop of another one nothing begins by the heartbeat that was there
 before it: the next frame of a program that had just hung, and is no lost one yet, would undo it.
 
@@ -10,7 +11,9 @@ next one.
 from math import inf, nan
 from typing import Final
 
-_MOST_MASTERS: Final = 64  # whose last heartbeats are known
+from gateway.registers.command import NO_CHANNEL, Channel
+
+_MOST_MASTERS: Final = 64  # whose last heartbeats are known, and as many frames'
 
 
 class Lease:
@@ -22,6 +25,7 @@ class Lease:
         self._changed_s = -inf
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
+        self._brought: dict[Channel, int] = {}  # of each frame its last
         self._master = ""  # who has the lease
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
 
@@ -29,18 +33,22 @@ class Lease:
         """Take over a value without counting it as a beat: the bank itself zeroed the command block."""
         self._heartbeat = heartbeat
 
-    def observe(self, now_s: float, heartbeat: int, who: str = "") -> None:
-        """Note the time of a heartbeat that this master has changed."""
-        if self._is_beat(heartbeat, who):
+    def observe(self, now_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL) -> None:
+        """Note the time of a heartbeat that this master has changed, in its frame of this channel."""
+        if self._is_beat(heartbeat, who, channel):
             self._changed_s, self._master = now_s, who
             self._unbeaten.pop(who, None)
             self._beats[who] = heartbeat, now_s
             if len(self._beats) > _MOST_MASTERS:
                 del self._beats[next(iter(self._beats))]
         self._heartbeat = heartbeat
+        self._brought[channel] = heartbeat
+        if len(self._brought) > _MOST_MASTERS:
+            del self._brought[next(iter(self._brought))]
 
-    def _is_beat(self, heartbeat: int, who: str) -> bool:
-        return heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
+    def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
+        is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
+        return is_new and self._brought.get(channel) != heartbeat
 
     def start(self, now_s: float, who: str = "") -> None:
         """Start the lease at an enable: the master has one length to beat."""
@@ -70,11 +78,11 @@ class Lease:
         """Return whether a takeover by this master would start its lease."""
         return who not in (self._master, *self._unbeaten)
 
-    def is_taken_again(self, heartbeat: int, who: str = "") -> bool:
+    def is_taken_again(self, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL) -> bool:
         """Return whether this master, from whom another one has the lease, has taken over before and not beaten since, were
         this value observed now; never without a lease."""
         is_again = who != self._master and who in self._unbeaten
-        return self._length_s is not None and is_again and not self._is_beat(heartbeat, who)
+        return self._length_s is not None and is_again and not self._is_beat(heartbeat, who, channel)
 
     def age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""
@@ -96,10 +104,12 @@ class Lease:
             return True
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
-    def would_have_beaten_since(self, since_s: float, heartbeat: int, who: str = "") -> bool:
+    def would_have_beaten_since(
+        self, since_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL
+    ) -> bool:
         """Return whether this master has beaten since then, were this value observed now; always true without a lease."""
         beaten_s = self._beats[who][1] if who in self._beats else self._changed_s
-        return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who)
+        return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who, channel)
 
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
         """Return what `is_fresh_since` would, were this value observed now: any master's, for a reset presses nothing."""

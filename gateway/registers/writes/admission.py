@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
-from gateway.registers.command import Command, Status
+from gateway.registers.command import Channel, Command, Status
 from gateway.registers.map.register_map import Block
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
@@ -48,15 +48,19 @@ _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
 class Write(NamedTuple):
-    """A write of the command block. touched: bits of the control word that the master has named (coils name some);
-    has_waited: it was asked for a while ago (`Peer.is_behind`)."""
+    """A write of the command block. touched: bits of the control word that the master has named (coils name some)."""
 
     block: Block
     address: int
     data: bytes
     host: str
+    peer: Peer
     touched: int = ALL_BITS
-    has_waited: bool = False
+
+    @property
+    def sender(self) -> tuple[str, Channel]:
+        """Return who writes, and by which channel."""
+        return self.host, (self.peer.host, self.peer.port, self.address, len(self.data))
 
 
 class AdmittedWrite(NamedTuple):
@@ -94,7 +98,7 @@ class Admission:
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
-        self._last_tares = LastTares()
+        self._last_tares = LastTares(has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -115,7 +119,7 @@ class Admission:
         if asked != before[CONTROL_WORD] or values[MODE] != before[MODE]:  # else they have been found good
             commands.check_known(values, write.block)
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
-            command = commands.command(values, asked, number, now_s, write.host)
+            command = commands.command(values, asked, number, now_s, write.sender)
             self._ask(command, values, write)
             return AdmittedWrite(values, asked, command, False, False, 0, True)
         permitted = self._permit(write, values, now_s)
@@ -130,7 +134,7 @@ class Admission:
         is_begun_anew = self._is_begun_anew(write.host, is_taken_over=is_taken_over)
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
-        command = commands.command(values, written, number, now_s, write.host)
+        command = commands.command(values, written, number, now_s, write.sender)
         if is_stop:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
@@ -138,7 +142,7 @@ class Admission:
         repeats = not self._is_in_use(write.host) and self.held_enables.repeats(
             write.host, self._frame(write, values, written), now_s
         )
-        command = command._replace(has_waited=write.has_waited, repeats=repeats)
+        command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)
         self._check_tare(command, word_at, brings_beat=HEARTBEAT in self._offsets(write))
@@ -154,7 +158,7 @@ class Admission:
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
         if admitted.command.control_word & ControlBit.TARE:
-            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat)
+            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat, admitted.command.received_s)
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
@@ -164,12 +168,12 @@ class Admission:
     def _is_plain(self, write: Write, word: int) -> bool:
         """The commonest write of all, a setpoint and a heartbeat of the owner: no bit rises or falls, it held none, nothing
         was lowered, no run has the output, it has not waited. What the checks below would find is known."""
-        is_usual = not (write.has_waited or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
+        is_usual = not (write.peer.is_behind or word & RUN_BITS_OR_EDGES) and self.is_usual(write.host)
         return is_usual and self._ownership.admits(write.host) and not self._is_begun_anew(write.host)
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        is_held = host in self.held_runs.by_host or self.held_enables.knows(host)
+        is_held = host in self.held_runs.by_host or self.held_enables.knows(host) or self._last_tares.knows(host)
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
@@ -249,8 +253,8 @@ class Admission:
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
             frame, asks = self._frame(write, values, word), bool(word & STARTS)
-            if reason is RefusalReason.TARE_REFUSED and frame.heartbeat is not None:
-                self._last_tares.note(write.host, frame.heartbeat)
+            if reason is RefusalReason.TARE_REFUSED:
+                self._last_tares.note(write.host, int(values[HEARTBEAT]), now_s)
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
@@ -259,11 +263,12 @@ class Admission:
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
             self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
-        offsets = self._offsets(write) if self.held_enables.knows(write.host) else ()
-        if HEARTBEAT in offsets:
-            self.held_enables.hear(write.host, heartbeat)
-        if CONTROL_WORD in offsets and write.touched & ENABLE & ~asked:
-            self.held_enables.let_go(write.host)
+        for held, bit in ((self.held_enables, ControlBit.ENABLE), (self._last_tares, ControlBit.TARE)):
+            offsets = self._offsets(write) if held.knows(write.host) else ()
+            if HEARTBEAT in offsets:
+                held.hear(write.host, heartbeat)
+            if CONTROL_WORD in offsets and write.touched & ~asked & bit:
+                held.let_go(write.host)
 
     # -- why not
 
@@ -296,11 +301,14 @@ class Admission:
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
     def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
-        if not (brings_beat and self._rules.has_lease and command.control_word & ControlBit.TARE):
+        host, beat, now_s = command.peer, command.heartbeat, command.received_s
+        if not command.control_word & ControlBit.TARE:
             return
-        if self._last_tares.repeats(command.peer, command.heartbeat):
-            self.held_enables.note_lost(command.peer, command.heartbeat)
-            text = f"tare refused: heartbeat = {command.heartbeat} as at its last one: write another value with it"
+        if self._last_tares.repeats(host, beat if brings_beat else None, now_s):
+            self._last_tares.note(host, beat, now_s)
+            if brings_beat:
+                self.held_enables.note_lost(host, beat)
+            text = f"tare refused: heartbeat = {beat} as at its last one: write another value with it"
             raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 
     def _check_starts(self, command: Command, word_at: int) -> None:

@@ -12,7 +12,7 @@ from struct import Struct
 from typing import Final
 
 from gateway.codes.refusals import RefusalReason
-from gateway.registers.command import Command
+from gateway.registers.command import Channel, Command
 from gateway.registers.image import RegisterImage
 from gateway.registers.map.register_map import Block, RegisterMap
 from gateway.registers.refusal import Refusal
@@ -208,8 +208,11 @@ class CommandBlock:
             words = high_first if block.word_order is WordOrder.ABCD else swap_words(high_first)
             self._image.write(base + 2 * offset, words)
 
-    def command(self, values: Values, control_word: int, number: int, received_s: float, peer: str) -> Command:
-        """Return these values in SI units, in the order of NAMES. control_word: as written, edge bits included."""
+    def command(
+        self, values: Values, control_word: int, number: int, received_s: float, sender: tuple[str, Channel]
+    ) -> Command:
+        """Return these values in SI units, in the order of NAMES. control_word: as written, edge bits included; sender: who
+        writes, by which channel."""
         v = values
         return Command(
             _CONTROL_WORDS[control_word],
@@ -227,7 +230,7 @@ class CommandBlock:
             v[12] / 1000.0,
             number,
             received_s,
-            peer,
+            *sender,
         )
 
     def differences(self, before: Values, after: Values) -> str:

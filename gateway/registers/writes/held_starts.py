@@ -12,6 +12,7 @@ from typing import Final, NamedTuple, TypeVar
 _Kept = TypeVar("_Kept")
 
 _MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
+_CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
 _TOLD_S: Final = 1.0  # from one time that the next process is told to another
 _DOWN_S: Final = 10.0  # that a start may take, in which nobody can write
@@ -77,19 +78,39 @@ class _Refused(NamedTuple):
 
 
 class LastTares:
-    """The heartbeat beside each host's last tare, taken or refused: of a program that stands still the same one comes on and
-    on, and whatever lies on the tool by then would become the zero."""
+    """The heartbeat that stood at each host's last tare, taken or refused, and when that was, s: of a program that stands still
+    the same one comes on and on, and whatever lies on the tool by then would become the zero. Who has written another
+    heartbeat since, or the bit as 0, goes on. has_lease: a heartbeat has to change; else none is noted."""
 
-    def __init__(self) -> None:
-        self._beats: dict[str, int] = {}
+    def __init__(self, *, has_lease: bool = True) -> None:
+        self._has_lease = has_lease
+        self._last: dict[str, tuple[int, float]] = {}
 
-    def note(self, host: str, heartbeat: int) -> None:
-        """Note a tare, and the heartbeat that came with it."""
-        _keep_latest(self._beats, host, heartbeat)
+    def note(self, host: str, heartbeat: int, now_s: float) -> None:
+        """Note a tare, and the heartbeat that came with it, or else stood."""
+        if self._has_lease:
+            _keep_latest(self._last, host, (heartbeat, now_s))
 
-    def repeats(self, host: str, heartbeat: int) -> bool:
-        """Decide whether this host has brought this heartbeat with its last tare."""
-        return self._beats.get(host) == heartbeat
+    def repeats(self, host: str, heartbeat: int | None, now_s: float) -> bool:
+        """Decide whether this host has brought this heartbeat with its last tare; None: one that brings none comes as often as
+        only a cycle does."""
+        if host not in self._last:
+            return False
+        beat, tared_s = self._last[host]
+        return now_s - tared_s < _CYCLE_S if heartbeat is None else heartbeat == beat
+
+    def knows(self, host: str) -> bool:
+        """Decide whether this host has tared, and has not gone on since."""
+        return host in self._last
+
+    def hear(self, host: str, heartbeat: int) -> None:
+        """Note a heartbeat of a host."""
+        if self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
+            self.let_go(host)
+
+    def let_go(self, host: str) -> None:
+        """Note that a host has written the bit as 0."""
+        self._last.pop(host, None)
 
 
 class HeldEnables:

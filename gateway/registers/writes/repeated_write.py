@@ -21,6 +21,7 @@ _BEHIND: Final = _BEFORE + 2
 _AT_HEARTBEAT: Final = Command._fields.index("heartbeat")
 _AT_NUMBER: Final = Command._fields.index("number")
 _AT_RECEIVED: Final = Command._fields.index("received_s")
+_AT_CHANNEL: Final = Command._fields.index("channel")
 _new: Final = tuple.__new__  # of a named tuple with all its fields: in half of the time of its own
 
 
@@ -54,6 +55,7 @@ class RepeatedWrite:
         values[_AT_HEARTBEAT] = heartbeat
         values[_AT_NUMBER] += 1
         values[_AT_RECEIVED] = now()
+        values[_AT_CHANNEL] = peer.host, peer.port, self._commands.first, len(data)
         command = _new(Command, values)
         if self._admission.decide(_new(ProposedWrite, (command, tuple))):
             return None

@@ -113,7 +113,8 @@ def test_how_the_run_before_ended_is_not_how_this_one_does() -> None:
     assert [run.look().phase for _ in range(3)] == ["idle", "ladder", "stored"]
     run.stop()
     run.close()
-    assert run._client.written == [int(ControlBit.START_CALIBRATION), 0]  # type: ignore[attr-defined]
+    start, _, stop = run._client.written  # type: ignore[attr-defined]
+    assert (start, stop) == (ControlBit.START_CALIBRATION, 0)
 
 
 def test_a_heartbeat_that_is_refused_is_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,6 +139,7 @@ def test_a_heartbeat_goes_round(monkeypatch: pytest.MonkeyPatch) -> None:
             raise RefusedError(6, "write 1 at 4")
 
     monkeypatch.setattr(client, "write_values", hear)
+    run._number = 0
     run.begin()
     run._beat.join(20.0)
     assert not run._beat.is_alive() and beats == [*range(1, 0x10000), 0, 1]

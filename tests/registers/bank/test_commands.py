@@ -22,7 +22,12 @@ def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
     master.write(0, 1, 1200)
     (command,) = commands
     assert command == Command(
-        control_word=ControlBit.ENABLE, force_setpoint_n=12.0, number=1, received_s=7.0, peer="10.0.0.1"
+        control_word=ControlBit.ENABLE,
+        force_setpoint_n=12.0,
+        number=1,
+        received_s=7.0,
+        peer="10.0.0.1",
+        channel=("10.0.0.1", 40000, 0, 4),
     )
 
 

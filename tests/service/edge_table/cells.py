@@ -65,7 +65,7 @@ class Cell:
         data = pack(">H", int(self.values[0])) if self.block == "coils" else self.data
         touched = 0x7F if self.block == "coils" else 0xFFFF
         admitted = rig.bank._admission.admit(
-            Write(block, self.address, data, OWNER.identity, touched), rig.bank.command.number + 1, rig.now()
+            Write(block, self.address, data, OWNER.identity, OWNER, touched), rig.bank.command.number + 1, rig.now()
         )
         assert admitted is not None
         return (tuple(round(value, 4) for value in admitted.values[:13]), *admitted[1:2], admitted.command.control_word,
@@ -75,7 +75,7 @@ class Cell:
 def _forget_others(rig: SmallRig) -> None:
     """No other cell's write was before this one."""
     rig.bank.held_enables.let_go(OWNER.identity)
-    rig.bank._admission._last_tares.note(OWNER.identity, -1)
+    rig.bank._admission._last_tares.let_go(OWNER.identity)
 
 
 def cells(stands_n: float) -> Iterator[Cell]:

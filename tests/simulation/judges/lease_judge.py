@@ -2,10 +2,10 @@
 its master beats. Frames that flow with one and the same heartbeat, reads and refused writes renew nothing. No code of the
 gateway is used here."""
 
-from math import inf, isnan
+from math import inf, isnan, nan
 
 from tests.simulation.judges.observer import DOWN_S, RUN_BITS, Observer
-from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of
+from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of, written_address
 from tests.simulation.masters.tcp_master import TAKE
 
 REPEATED_S = 2.0
@@ -19,11 +19,13 @@ class LeaseJudge:
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
-        self._beat: float | None = None
-        """What the register holds; None where nobody knows."""
+        self._beat = nan
+        """What the register holds; not a number where nobody knows."""
         self._is_enabled = False
         """Whether the last write of the control word has enabled; not where that cannot be told from its bits."""
         self._renewed_s = -inf
+        self._brought: dict[tuple[str, int, int, int], float] = {}
+        """Of each master's frames the last heartbeat."""
         self._took: set[str] = set()
         """Who has taken over, and has not beaten since."""
         self._refused: dict[str, tuple[bytes, float]] = {}
@@ -37,7 +39,8 @@ class LeaseJudge:
         begins = control is not None and (
             control < 0 or control & RUN_BITS or was_off or (takes and host not in self._took)
         )
-        beats = beat is not None and (isnan(beat) or beat != self._beat)
+        frame = host, pdu[0], written_address(pdu), len(pdu)
+        beats = beat is not None and (isnan(beat) or beat not in (self._beat, self._brought.get(frame)))
         if begins or not is_answered or beats:
             self._renewed_s = max(self._renewed_s, now_s)
         if beats:
@@ -47,7 +50,7 @@ class LeaseJudge:
         if control is not None:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
         if beat is not None:
-            self._beat = beat if is_answered and not isnan(beat) else None
+            self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
 
     def note_start(self, pdu: bytes, now_s: float, *, is_taken: bool, host: str) -> None:
         """A start was answered: told before `note_write`. One that was refused may begin nothing while it stays as it was."""
@@ -64,8 +67,9 @@ class LeaseJudge:
             self._observer.complain("I7 repeated start", told, now_s)
 
     def forget(self) -> None:
-        """Another process does not know what was refused once."""
+        """Another process does not know what was refused once, nor what each frame brought."""
         self._refused.clear()
+        self._brought.clear()
 
     def note_local_run(self, now_s: float) -> None:
         """A run that a person watches at the machine needs no master."""

@@ -58,3 +58,17 @@ def test_a_cell_that_is_plugged_in_again_lets_no_program_press_that_hung_meanwhi
     ]
     outcome = run_schedule(90029, events, 6.0)
     assert outcome.broken == () and outcome.largest_v > 0.0
+
+
+def test_two_frames_that_hang_beside_each_other_renew_no_lease_for_gateway_or_judge() -> None:
+    events = [Event(1.0, "worker", "take", (30.0,)), Event(2.5, "worker", "hang", (30000.0,))]
+    outcome = run_schedule(90020, events, 3.5)
+    assert outcome.broken == () and outcome.largest_v > 3.0
+    observer, frames = Observer(replace(BOUNDS, lease_s=0.2)), (FRAME, write_one_pdu(4, 30000))
+    judge = LeaseJudge(observer)
+    observer.hear(b"SET 0\r\nSET 300\r\n", 1.0)
+    observer.note_accepted(1, 1.0)
+    for tick in range(20):
+        judge.note_write(frames[tick % 2], 1.0 + 0.1 * tick, is_answered=True, host="10.0.0.1")
+        judge.look(1.0 + 0.1 * tick)
+    assert [told.partition(" at ")[0] for told in observer.broken][-1] == "I3 heartbeat"

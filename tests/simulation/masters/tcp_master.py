@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from tests.simulation.kernel.network import Caller, Line
 from tests.simulation.kernel.virtual_time import VirtualLoop
 from tests.simulation.masters.spelling import (
+    BEAT,
     ENABLE,
     WAYS,
     WRITES,
@@ -59,7 +60,7 @@ class Master:
     on_pdu: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_answered: None)
     on_start: Callable[[bytes, bool], None] = staticmethod(lambda pdu, is_taken: None)
     on_refusal: Callable[[], None] = staticmethod(lambda: None)
-    _is_hung = False
+    _is_hung, _beat_beside = False, 0
 
     def __init__(
         self,
@@ -200,9 +201,10 @@ class Master:
         self.hold(force_n, ENABLE)
         self._wish = self._wish._replace(program=tuple(map(int, numbers)))
 
-    def hang(self) -> None:
-        """Go on with the last frame, whose heartbeat stays as it was."""
-        self._is_hung = True
+    def hang(self, beat_beside: float = 0.0) -> None:
+        """Go on with the last frame, whose heartbeat stays as it was. beat_beside: heartbeat of another frame of its own, which
+        stays as well; 0: it has none."""
+        self._is_hung, self._beat_beside = True, int(beat_beside)
 
     def run(self, name: str) -> None:
         """Clear what is latched, start a run by its bit, and beat from now on."""
@@ -243,6 +245,8 @@ class Master:
             wish = self._wish = self._wish._replace(beat=self._beat)
             for pdu in (self._way.beat(wish),) if self._way.beat else self._way.begin(wish):
                 self.ask(pdu)
+            if self._is_hung and self._beat_beside:
+                self.ask(write_one_pdu(BEAT, self._beat_beside))
             self._outside.call_later(self._beat_s, self._keep_beating, number)
 
     # -- answers

@@ -82,6 +82,8 @@ class _SelfTest:
     """One self-test on a gateway, by its registers."""
 
     def __init__(self, client: "GatewayClient") -> None:
+        from gateway.cli.master.first_heartbeat import draw_first_heartbeat
+
         register_map = client.register_map
         found = [one for one in register_map.registers_of("proof") if one.name.startswith(_PREFIX)]
         if not found:
@@ -90,7 +92,7 @@ class _SelfTest:
         self._registers: dict[str, Register] = {one.name.removeprefix(_PREFIX): one for one in found}
         self._word, self._heartbeat = register_map.find("control_word"), register_map.find("heartbeat")
         (beat,) = client.read_values([self._heartbeat])
-        self._beat = int(beat.value)
+        self._beat = draw_first_heartbeat(int(beat.value))
         self._has_begun = False
 
     def begin(self) -> None:

@@ -75,6 +75,7 @@ def command(
     from gateway.cli.force_hold.heartbeat import HeartbeatThread
     from gateway.cli.force_hold.sequence import HoldRun
     from gateway.cli.master.client import GatewayClient
+    from gateway.cli.master.first_heartbeat import draw_first_heartbeat
     from gateway.cli.master.refusal_text import explain_refusals
     from gateway.profiles import load_register_map
 
@@ -85,7 +86,7 @@ def command(
         with explain_refusals(client):
             client.check_map()
             (heartbeat,) = client.read_values([register_map.find("heartbeat")])
-        run = HoldRun(force_n, heartbeat=int(heartbeat.value), resets=options["resets"])
+        run = HoldRun(force_n, heartbeat=draw_first_heartbeat(int(heartbeat.value)), resets=options["resets"])
         beat = HeartbeatThread(client, run, lease, time.monotonic)
         _show_until_end(beat, for_s, as_json=as_json)
     _report_end(beat, client.where, as_json=as_json)

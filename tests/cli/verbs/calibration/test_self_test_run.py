@@ -8,6 +8,7 @@ import pytest
 
 from gateway import defaults
 from gateway.cli.errors import CliError
+from gateway.cli.master import first_heartbeat
 from gateway.cli.verbs.calibration import self_test
 from gateway.processes import exit_codes
 from gateway.profiles import load_register_map
@@ -102,8 +103,9 @@ def test_a_stop_that_is_lost_too_hides_nothing_of_why(gateway: Registers, monkey
 def test_a_test_that_does_not_end_is_stopped_after_half_a_minute(
     gateway: Registers, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """And beats until then, each time with another value, from the one that stands."""
-    gateway = Registers(heartbeat=0xFFFE)
+    """And beats until then, each time with another value, from one that is drawn."""
+    gateway = Registers(heartbeat=7)
+    monkeypatch.setattr(first_heartbeat, "randrange", lambda first, end: 0xFFFE - 7)
     time = SimpleNamespace(now_s=0.0, monotonic=lambda: time.now_s)
     time.sleep = lambda _seconds: setattr(time, "now_s", time.now_s + 1.0)
     monkeypatch.setattr(self_test, "time", time)

@@ -263,6 +263,27 @@ def test_a_tare_that_was_refused_is_not_taken_from_a_program_that_hung_meanwhile
     assert rig.answer(0, TARE, 0, 0, 0, BEAT + 1, peer=HUNG) is None
 
 
+@pytest.mark.parametrize("hangs", [True, False])
+def test_the_tare_of_a_program_that_writes_single_words_is_taken_as_often_as_its_heartbeat_moves(hangs: bool) -> None:
+    """Of one that hung it was taken in each cycle, for as long as its frames flowed."""
+    rig = SmallRig(_control(LeaseAction.FAULT)).run(1.0)
+    refused = 0
+    for cycle in range(20):
+        refused += rig.answer(0, TARE, peer=HUNG) is not None
+        rig.write(4, BEAT if hangs else BEAT + cycle % 2, peer=HUNG)
+        rig.run(0.05)
+    assert refused == (18 if hangs else 0)
+    rig.write(0, 0, peer=HUNG)
+    rig.write(0, TARE, peer=HUNG)
+
+
+def test_a_tare_counts_again_behind_a_heartbeat_that_only_goes_to_and_fro() -> None:
+    rig = SmallRig(_control(LeaseAction.FAULT)).run(1.0)
+    for word, beat in ((TARE, 0), (0, 1), (0, 0), (0, 1), (TARE, 0)):
+        rig.run(0.1).write(0, word, 0, 0, 0, beat)
+    assert rig.state is State.OFF
+
+
 def test_without_a_lease_a_tare_needs_no_other_heartbeat() -> None:
     rig = SmallRig(settings()).run(1.0)
     for _ in range(2):
