@@ -146,6 +146,14 @@ def test_a_unit_by_another_name_is_that_unit(written: str, quantity: str, unit: 
     assert unit_of(written, quantity) == unit
 
 
+@pytest.mark.parametrize(
+    ("written", "quantity"), [("MPA", "pressure"), ("MN", "force"), ("MV", "voltage"), ("MS", "time")]
+)
+def test_capitals_that_may_be_two_units_are_none(written: str, quantity: str) -> None:
+    """A thousand millionths, or a million: 6 MPA are 60 bar, or nothing."""
+    assert unit_of(written, quantity) is None
+
+
 def test_the_same_unit_changes_no_bit() -> None:
     assert {linear_conversion(quantity, unit, unit) for quantity, units in LINEAR.items() for unit in units} == {
         (1.0, 0.0)
