@@ -100,4 +100,8 @@ DEFECTS = (
            "        self.outcome.resets_device = True\n        if self.state is State.OFF:\n            return\n",
            "        if self.state is State.OFF:\n            return\n        self.outcome.resets_device = True\n",
            ("control/test_states.py",)),
+    Defect("a force that is off in the mean is called unsteady", "control/supervision/in_band.py",
+           "if now_s - self._otherwise_since_s > longest_s or self._band.unreachable:",
+           "if now_s - self._otherwise_since_s > longest_s:",
+           ("control/supervision/test_in_band.py",)),
 )  # fmt: skip

@@ -228,6 +228,16 @@ def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
     assert bank.read_registers(register_map.find("slip_stops@active").address, 1) == b"\0\2"
 
 
+@pytest.mark.parametrize(
+    ("limits_n", "shown_n"), [((), (0.0, 60.0)), ((2.0, 40.0), (2.0, 40.0)), ((-5.0, 80.0), (0.0, 60.0))]
+)
+def test_the_active_set_tells_the_forces_that_it_allows(bank, register_map, limits_n, shown_n):
+    """Its own limits, and no more than its branches reach."""
+    bank.set_active_model(replace(CALIBRATION, force_limits_n=limits_n))
+    low, high = (register_map.find(f"force_{end}@active") for end in ("low", "high"))
+    assert tuple(one.decode(bank.read_registers(one.address, 2)) for one in (low, high)) == shown_n
+
+
 def test_sets_that_cannot_be_carried_are_said():
     with pytest.raises(ValueError, match="17 numbers in an array of at most 16"):
         CoefficientSet(16, 0.0, 1.0, (0.0,) * 17, (), (), (), 0.0, 1.0, 0.0).to_words()
