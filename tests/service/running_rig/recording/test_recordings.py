@@ -64,12 +64,14 @@ def test_a_recording_names_the_calibration_that_is_in_use_now(recordings: Record
 
 
 def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings) -> None:
+    wanted: list[WantedRecording | None] = []
+    recordings.on_wanted = wanted.append
     recordings.start(for_s=2.0)
     recordings.flush(100.0)
     recordings.flush(101.99)
-    assert recordings.status()["recording"]
+    assert recordings.status()["recording"] and wanted[-1]
     recordings.flush(102.0)
-    assert recordings.status() == {"recording": None}
+    assert recordings.status() == {"recording": None} and wanted[-1] is None
     assert [line for line in recordings._log if "ends after 2 s" in line]
 
 
