@@ -29,6 +29,7 @@ def test_a_file_says_the_same_as_the_text(tmp_path: Path) -> None:
     text = "time_s=1:ms,force_n=7:n,position_mm=5,tilt_deg=Angle of tool"
     assert column_mapping(str(path)) == column_mapping(text)
     assert column_mapping(None) is None
+    assert column_mapping(str(path.rename(tmp_path / "ZILLEN.YAML"))) == column_mapping(text)
 
 
 @pytest.mark.parametrize(
@@ -56,6 +57,7 @@ def test_a_wrong_text_is_told_with_what_is_allowed(text: str, words: str) -> Non
         ("time_s: 1\ntime_s: 2\n", "map.yaml:2:1"),
         ("force_n: {column: 2, units: n}\n", "is no column"),
         ("force_n: 2:bar\n", "map.yaml: 'bar' is no unit"),
+        ("force_n: {column: 2, unit: ''}\n", "map.yaml: '' is no unit"),
     ],
 )
 def test_a_wrong_file_is_told_with_its_place(text: str, words: str, tmp_path: Path) -> None:
