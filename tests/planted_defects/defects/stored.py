@@ -124,4 +124,11 @@ DEFECTS = (
     Defect("a clock that was set back has passed midnight", "recording/foreign/time_stamps.py",
            "< -0.5 * _DAY_US", "< 0.0",
            ("recording/tables/test_row_validity.py",)),
+    Defect("a set's least force is the most that it allows", "bsfm/model.py",
+           "return self.force_limits_n[0], self.force_limits_n[-1]", "return self.force_limits_n[0], self.force_limits_n[0]",
+           ("registers/bank/test_staging.py",)),
+    Defect("of a long table the pieces before the last are lost", "recording/tables/csv_table.py",
+           "                    blocks.append(np.array(rows, dtype=np.float64))\n                    rows = []",
+           "                    rows = rows[-1:]",
+           ("recording/tables/test_heads_of_tables.py",)),
 )  # fmt: skip

@@ -104,4 +104,7 @@ DEFECTS = (
            "if now_s - self._otherwise_since_s > longest_s or self._band.unreachable:",
            "if now_s - self._otherwise_since_s > longest_s:",
            ("control/supervision/test_in_band.py",)),
+    Defect("a zero is one reading of each few", "control/tare.py",
+           "self._recent_n.append(self._sum_n / self._samples)", "self._recent_n.append(force_n)",
+           ("control/zero/test_zero.py",)),
 )  # fmt: skip
