@@ -29,7 +29,7 @@ _VERSION, _EXTENSIONS = 0xA0, 0xA3
 
 
 class PeerCertificate(NamedTuple):
-    """name: the subject's common name, several by commas; role: what the extension says, empty where it is not one UTF8String,
+    """name: the subject's common name; role: what the extension says, empty where it is not one UTF8String,
     None without one; serial: in hex, as `openssl x509 -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the
     times do; subject, issuer: the whole names as the bytes stand there, to see which of several has signed which."""
 
@@ -98,14 +98,14 @@ def _time(tag: int, body: bytes) -> str:
 
 
 def _common_name(subject: bytes) -> str:
-    """All of them where a CA has written several: who is told apart by one that is left out would be taken for another."""
-    names = []
+    """Of several the last, which is the most specific one (RFC 2818, section 3.1)."""
+    name = ""
     for _, relative in _parts(subject):
         for _, pair in _parts(relative):
             (_, kind), (tag, value) = _parts(pair)
             if kind == _COMMON_NAME_BYTES:
-                names.append(value.decode(_ENCODINGS.get(tag, "utf-8")))
-    return ", ".join(names)
+                name = value.decode(_ENCODINGS.get(tag, "utf-8"))
+    return name
 
 
 def _role(extensions: bytes) -> str | None:

@@ -84,7 +84,7 @@ class RtuReceiver:
         "_unit", "_units", "_wait_s", "frames", "noise_bytes",
     )  # fmt: skip
 
-    def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool = True) -> None:
+    def __init__(self, unit: int, baud: int, character_s: float, *, may_echo: bool) -> None:
         self._unit = unit
         self._units: set[int] = set()  # others that were heard on this line
         self._character_s = character_s

@@ -1,6 +1,7 @@
 """An audit that somebody removes, moves or replaces under the gateway: it goes on where it is found, and both say so."""
 
 import errno
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -117,3 +118,31 @@ def test_what_was_removed_is_told_by_the_first_line_that_the_disk_takes(
     (told,) = written.append([{"what": "enable"}])
     written.close()
     assert told.startswith("A352") and whats(tmp_path)[-2:] == ["chain broken", "enable"]
+
+
+def test_what_a_power_cut_may_take_is_synced_before_anybody_relies_on_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A head that is renamed before its bytes are on the disk may be empty then, and a new file may have no name."""
+    synced: list[str] = []
+    sync, replace = os.fsync, Path.replace
+
+    def note(descriptor: int) -> None:
+        synced.append(Path(f"/proc/self/fd/{descriptor}").readlink().name)
+        sync(descriptor)
+
+    def note_replace(path: Path, target: Path) -> Path:
+        synced.append(f"{path.name} -> {target.name}")
+        return replace(path, target)
+
+    monkeypatch.setattr(os, "fsync", note)
+    monkeypatch.setattr(Path, "replace", note_replace)
+    file = AuditFile(tmp_path, longest_bytes=1)
+    file.append([{"what": "start"}])
+    began = synced.copy()
+    synced.clear()
+    file.append([{"what": "enable"}])
+    file.close()
+    head = ["head.new", "head.new -> head"]
+    assert began == [tmp_path.name, *head, "audit", "audit", "000000000001.jsonl", *head, "audit"]
+    assert synced == ["000000000002.jsonl", *head, "audit"], "and each new file's name"

@@ -44,9 +44,10 @@ def test_an_audit_that_grows_while_it_is_verified_holds(state: Path, monkeypatch
     file.close()
 
 
-def test_a_file_under_another_number_is_found(state: Path) -> None:
+@pytest.mark.parametrize("away", [1, -1])
+def test_a_file_under_another_number_is_found(state: Path, away: int) -> None:
     path = files_of(state)[1]
-    path.rename(path.with_name(f"{int(path.stem) + 1:012d}.jsonl"))
+    path.rename(path.with_name(f"{int(path.stem) + away:012d}.jsonl"))
     broken = verify_audit(state).broken
     assert broken and "its file is named by" in broken.text
 

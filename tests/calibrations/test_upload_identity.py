@@ -217,4 +217,12 @@ def test_the_model_hash_covers_all_that_changes_a_voltage():
         model_hash(replace(DEMO, response=replace(slower, damping=0.0))),
     }
     assert len(changed) == len(CHANGES) + 4
+    many = replace(DEMO, slip_radii_v=tuple(0.1 * k for k in range(1, 13)), slip_shares=(0.04,) * 10 + (0.2, 0.4))
+    of_the_last = {
+        "shares": {"slip_shares": (0.04,) * 10 + (0.4, 0.2)},
+        "radii": {"slip_radii_v": (*many.slip_radii_v[:-1], 1.5)},
+    }
+    assert len({model_hash(replace(many, **change)) for change in ({}, *of_the_last.values())}) == 3, (
+        "beyond the registers, too"
+    )
     assert model_hash(replace(DEMO, name="x", number=7, source="y", rms_n=1.0)) == model_hash(DEMO)

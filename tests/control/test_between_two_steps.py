@@ -42,3 +42,17 @@ def test_a_rig_with_a_valve_has_stopped_when_it_stands_where_it_rests() -> None:
             break
     assert steps[-1] == (State.OFF, PUSH, True)
     assert (State.OFF, PULL, False) in steps, "the output goes off first"
+
+
+def test_from_the_moment_on_at_which_the_gateway_stops_no_force_is_taken() -> None:
+    """A write that comes before the next step would be lost, and its master told that it was taken."""
+    bench = Bench()
+    bench.run(0.5)
+    bench.enable(10.0)
+    asked = ProposedWrite(
+        bench.command._replace(force_setpoint_n=20.0, number=bench.command.number + 1), lambda: ("force_setpoint",)
+    )
+    assert bench.controller.refusal_of(bench.now_s, asked, bench.line) is None
+    bench.controller.stop()
+    refused = bench.controller.refusal_of(bench.now_s, asked, bench.line)
+    assert refused and refused.reason is RefusalReason.STOPPING

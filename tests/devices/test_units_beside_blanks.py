@@ -3,7 +3,7 @@
 import pytest
 
 from gateway.devices import TemplateError, cell_host
-from gateway.devices.force_reading import ForceReading, ForceUnit
+from gateway.devices.force_reading import ForceReading, ForceUnit, unit_meant
 from gateway.devices.messages import ForceSample, Quality
 from gateway.units import NEWTON_PER_UNIT
 from tests.dialogues.cells.test_overload_dialogue import cell
@@ -56,3 +56,12 @@ def test_a_unit_beside_another_status_is_read_over(line: bytes) -> None:
     reading = ForceReading(frame=RINSTRUM, unit="kg", quality=HEALTH, rate_hz=10.0)
     (found,) = cell_host(cell(stream=reading)).receive(line, 0.0)
     assert isinstance(found, ForceSample) and found.force_n == pytest.approx(-2.34 * NEWTON_PER_UNIT["kg"])
+
+
+@pytest.mark.parametrize(
+    ("words", "unit"),
+    [("N", "N"), ("kg Kg KG kgf kgF KGF", "kg"), ("g gf gF", "g"), ("lb Lb LB lbs LBS lbf lbF LBF", "lb")],
+)
+def test_a_unit_is_known_however_indicators_write_it(words: str, unit: str) -> None:
+    assert {unit_meant(f" {word} ") for word in words.split()} == {unit}
+    assert {unit_meant(word) for word in ("kN", "MN", "oz")} == {"another unit"}

@@ -106,6 +106,7 @@ def test_what_others_can_reach_is_not_loopback(host: str) -> None:
 
 def test_an_ipv4_peer_is_the_same_through_an_ipv6_socket() -> None:
     assert address_of("::ffff:192.0.2.7") == address_of("192.0.2.7")
+    assert str(address_of("fe80::7%eth0")) == "fe80::7", "whichever card it comes by"
 
 
 def test_leaving_and_coming_back_is_no_way_to_a_new_burst() -> None:

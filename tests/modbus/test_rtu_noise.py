@@ -9,7 +9,7 @@ from gateway.modbus.crc import crc16
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.host_answers import loopback_request
-from tests.modbus.rtu_bus import SILENCE_S, Bus
+from tests.modbus.rtu_bus import BAUD, CHARACTER_S, SILENCE_S, Bus
 from tests.modbus.test_rtu_receiver import COMMAND, INSIDE, OURS, READ, WRITE, answered, registers_answer
 from tests.modbus.test_rtu_receiver_limits import MANY, known
 
@@ -172,3 +172,12 @@ def test_a_frame_whose_pieces_all_come_late_has_its_time_only_in_more_than_ten()
         cuts = [*range(pieces), len(frame)]
         bus = Bus(baud=115200).send(*(frame[at:end] for at, end in pairwise(cuts)), pause_s=0.0195)
         assert bus.requests() == heard, pieces
+
+
+def test_of_requests_that_had_to_make_room_the_last_eight_are_carried_out() -> None:
+    """Sixty without a silence between them, by a program that waits for no answer: the newest are what it wants now."""
+    receiver = RtuReceiver(1, BAUD, CHARACTER_S, may_echo=True)
+    requests = [P.write_register_request(1, number) for number in range(MOST_BYTES // 8 + 1)]
+    receiver.receive(b"".join(encode_adu(1, request) for request in requests), 0.0)
+    taken = receiver.take(1.0)
+    assert [request.pdu for request in taken] == requests[-8:] and not any(request.is_answered for request in taken)

@@ -284,7 +284,7 @@ def test_what_is_passed_over_in_noise_could_begin_nothing() -> None:
     """Held against the slow way: each place by itself, a silence before it or not."""
     for seed in range(40):
         chance = random.Random(seed)
-        receiver = RtuReceiver(1, 19200, 11 / 19200)
+        receiver = RtuReceiver(1, 19200, 11 / 19200, may_echo=True)
         frames = [encode_adu(chance.randrange(1, 9), pdu) for pdu in chance.sample(PDUS, 3)]
         for part in (chance.randbytes(20), frames[0], chance.randbytes(9), frames[1][:-1], frames[2]):
             receiver.receive(part, (receiver.deadline_s or 0.0) + chance.choice((-0.001, 0.001)))

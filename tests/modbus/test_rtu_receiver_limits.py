@@ -21,7 +21,7 @@ def test_a_silence_is_one_from_its_first_moment() -> None:
         bus = Bus()
         assert bus.send(encode_adu(2, READ)).requests() == []
         assert bus.send(begun, OURS, pause_s=silences * SILENCE_S).requests() == heard, silences
-    receiver = RtuReceiver(1, BAUD, CHARACTER_S)
+    receiver = RtuReceiver(1, BAUD, CHARACTER_S, may_echo=True)
     receiver.receive(encode_adu(2, READ), 0.0)
     receiver.take(1.0)
     receiver.receive(begun, 0.0)
@@ -287,7 +287,7 @@ def test_a_request_behind_a_moment_of_noise_is_answered_at_once() -> None:
 def test_noise_that_never_ends_is_looked_at_for_an_eighth_of_a_core_and_no_request_behind_it_waits(pool: bytes) -> None:
     """16 bytes in 1.8 ms of 115200 baud are silent for a moment each time, and half a kilobyte was looked through in it."""
     chance, looked_at, now_s = Random(3), 0, 0.0
-    receiver = RtuReceiver(1, 115200, 11 / 115200)
+    receiver = RtuReceiver(1, 115200, 11 / 115200, may_echo=True)
     for _ in range(5000):
         receiver.receive(bytes(chance.choices(pool, k=16)), now_s)
         while (deadline_s := receiver.deadline_s) is not None and deadline_s < now_s + 0.0018:

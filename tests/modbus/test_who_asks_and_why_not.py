@@ -74,3 +74,17 @@ def test_a_master_is_its_address_or_what_its_certificate_says_and_never_both() -
     plain, other, named = Peer("10.0.0.5", 5), Peer("10.0.0.6", 5), Peer("10.0.0.5", 6, "cell")
     assert [each.identity for each in (plain, other, named)] == ["10.0.0.5", "10.0.0.6", "certificate cell"]
     assert [str(each) for each in (plain, named)] == ["10.0.0.5:5", "cell (10.0.0.5:6)"]
+
+
+@pytest.mark.parametrize(
+    ("peer", "words"),
+    [
+        (Peer("10.0.0.5", 40001), "10.0.0.5:40001"),
+        (Peer("::1", 40001), "[::1]:40001"),
+        (Peer("::1"), "::1"),
+        (Peer("::1", 40001, "cell-7"), "cell-7 ([::1]:40001)"),
+        (Peer("/dev/ttyS0"), "/dev/ttyS0"),
+    ],
+)
+def test_who_asks_is_told_as_addresses_are_written(peer: Peer, words: str) -> None:
+    assert str(peer) == words

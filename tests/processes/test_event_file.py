@@ -201,9 +201,10 @@ def test_a_full_disk_is_one_alarm_and_its_end_says_what_is_missing(tmp_path: Pat
         log._disk = QueuedWriter("events", log._disk._write, log._event)  # type: ignore[union-attr]
         log._disk.start()
         log("cause", "again")
+        log("cause", "and again")
     assert sum("E150" in line for line in lines) == 1
     assert "No space left on device" in next(line for line in lines if "E150" in line)
-    assert [each.text for each in kept(tmp_path)] == ["again", "7 events were not kept before this one"]
+    assert [each.text for each in kept(tmp_path)] == ["again", "7 events were not kept before this one", "and again"]
 
 
 def test_what_is_noted_is_on_the_terminal_where_the_file_does_not_take_it(tmp_path: Path) -> None:

@@ -45,6 +45,17 @@ def test_empty_cells_and_faults_are_no_numbers(book: Path) -> None:
     assert [str(value) for value in columns["command_v"]] == ["2.5", "2.5", "nan"]
 
 
+def test_a_cell_of_excel_without_a_value_is_none_and_a_row_may_end_before_the_others(tmp_path: Path) -> None:
+    """`#N/A` is what NA() writes; cells at the end of a row that are empty are not there."""
+    made = openpyxl.Workbook()
+    for row in (["time_s", "command_v", "force_n"], [0.0, 2.5, "#N/A"], [0.1], [0.2, 2.5]):
+        made.active.append(row)
+    made.save(tmp_path / "table.xlsx")
+    target = tmp_path / "sheet.txt"
+    workbook.write_sheet(tmp_path / "table.xlsx", None, target)
+    assert target.read_text().splitlines()[1:] == ["0\t2.5\tnan", "0.1\t\t", "0.2\t2.5\t"]
+
+
 def test_a_part_that_unpacks_to_more_than_is_taken_is_refused_before_it_is_read(book: Path) -> None:
     bomb = with_part(book, "xl/sharedStrings.xml", b" " * (workbook.LARGEST_PART_BYTES + 1))
     assert bomb.stat().st_size < 100_000

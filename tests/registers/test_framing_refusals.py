@@ -69,3 +69,15 @@ def test_the_server_id_says_who_it_is_and_whether_a_fault_stands(bank: RegisterB
     for word, run in ((StatusBit.FAULT, b"F\x00"), (StatusBit(0), b"F\xff")):
         bank.publish(Status(status_word=int(word)))  # of now, although nobody has read a register since
         assert answer(b"\x11", bank, MASTER)[2:4] == run
+
+
+@pytest.mark.parametrize(
+    ("request_hex", "is_refused_write"), [("03 0000 007e", False), ("10 0001 0001 03 000100", True)]
+)
+def test_what_the_owner_may_not_read_is_no_refused_write_of_it(
+    bank: RegisterBank, request_hex, is_refused_write
+) -> None:
+    """A master that is lost right behind one is told of it, and not of its heartbeat alone."""
+    bank.write_registers(0, bytes.fromhex("0001 0064"), MASTER)
+    answer(bytes.fromhex(request_hex), bank, MASTER)
+    assert bool(bank.owner_refused) is is_refused_write

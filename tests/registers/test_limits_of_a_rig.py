@@ -73,6 +73,7 @@ def test_a_mode_that_is_no_number_is_refused_as_any_other_value(make_bank, maste
 def test_a_limit_is_told_with_what_has_set_it(make_bank, master_of):
     master = master_of(make_bank(force_source="calibration 3", voltage_max_v=8.0), "10.0.0.1")
     assert "(calibration 3)" in master.refusal(master.write, FORCE, 6001).sentence
+    assert "(calibration 3)" in master.refusal(master.write, PRECONTACT, 6001).sentence
     assert "(rig demo)" in master.refusal(master.write, 5, 8001).sentence
     assert "(map force-v1)" in master.refusal(master.write, 8, 10001).sentence
 
@@ -89,7 +90,7 @@ def test_a_number_is_the_same_command_as_a_word_and_as_a_float(make_bank, master
         assert master.float(FORCE_FLOAT) == struct.unpack(">f", struct.pack(">f", count / 100))[0], "as it was written"
 
 
-@pytest.mark.parametrize("limit_n", [40.2, 40.205, 40.200000123])
+@pytest.mark.parametrize("limit_n", [40.2, 40.205, 40.200000123, 40.204999999])
 def test_a_float_at_the_limit_is_the_limit_and_no_more(make_bank, master_of, limit_n):
     bank = make_bank(force_max_n=limit_n)
     master_of(bank, "10.0.0.1").write_float(FORCE_FLOAT, limit_n)
@@ -119,7 +120,7 @@ def test_a_setpoint_that_a_calibration_lowers_may_be_written_as_it_reads(make_ba
 
 def test_a_payload_heavier_than_the_load_cell_bears_is_refused(make_bank, master_of):
     """32.7 kg on a cell of 10 kg were accepted, and the next reading was an over-force."""
-    master = master_of(make_bank(payload_max_kg=10.0004), "10.0.0.1")
+    master = master_of(make_bank(payload_max_kg=10.0007), "10.0.0.1")
     master.write(PAYLOAD, 10000)
     master.write_float(200 + 2 * PAYLOAD, 2500.5)
     for act, address, grams in ((master.write, PAYLOAD, 10001), (master.write_float, 200 + 2 * PAYLOAD, 32000)):

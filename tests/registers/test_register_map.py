@@ -188,15 +188,17 @@ def test_values_survive_the_words(register_map):
 
 def test_the_hash_sees_numbers_and_neither_texts_nor_names(document):
     """A client commands nothing of another map: one new fault code of an update must not stop every robot."""
-    changed, reworded, renamed = deepcopy(document), deepcopy(document), deepcopy(document)
-    changed["blocks"]["command"]["registers"][1]["scale"] = 0.1
+    reworded, renamed = deepcopy(document), deepcopy(document)
     reworded["blocks"]["command"]["registers"][1]["text"] = "Something else"
     fault = next(one for one in renamed["blocks"]["status"]["registers"] if one["name"] == "fault_code")
     fault["values"] = {0: "none", 999: "one_more"}
     before = read_map(document).map_hash
     assert read_map(reworded).map_hash == before
     assert read_map(renamed).map_hash == before
-    assert read_map(changed).map_hash != before
+    for key, number in (("scale", 0.1), ("min", 0.5), ("max", 9.0), ("constant", 3), ("access", "R")):
+        changed = deepcopy(document)
+        changed["blocks"]["command"]["registers"][1][key] = number
+        assert read_map(changed).map_hash != before, key
 
 
 def small() -> dict:

@@ -95,6 +95,9 @@ def test_force_limits_of_its_own_come_out_as_the_decimals_that_were_meant(low_n,
     assert found.force_limits_n == own
 
 
+PULLS_AT_0_V = {"rising_handles_n": (-4.0, 20.0, 60.0), "falling_handles_n": (-4.0, 30.0, 60.0)}
+
+
 @pytest.mark.parametrize(
     ("change", "index", "reason"),
     [
@@ -114,6 +117,7 @@ def test_force_limits_of_its_own_come_out_as_the_decimals_that_were_meant(low_n,
         ({"rising_handles_n": (-4.0, 20.0, 60.0), "force_low_n": -2.0}, -1, UploadReason.FORCE_LIMITS),
         ({"force_high_n": swapped(40.0)}, -1, CoefficientReason.WORDS_SWAPPED),
         ({"force_low_n": swapped(2.0)}, -1, CoefficientReason.WORDS_SWAPPED),
+        ({**PULLS_AT_0_V, "force_low_n": swapped(2.0078125)}, -1, CoefficientReason.WORDS_SWAPPED),
     ],
 )
 def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):

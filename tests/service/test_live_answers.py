@@ -1,7 +1,9 @@
 """What processes beside control are told and may ask: the state as control has it, and Modbus by the rules of any face."""
 
 import json
+import time
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.live.live_state import LiveLine, LiveState
 from gateway.profiles import load_rig
 from gateway.registers.words import ControlBit, State
-from gateway.service.live_answers import AlarmTimes, clock_sentence
+from gateway.service.live_answers import AlarmTimes, _age_s, clock_sentence
 from gateway.service.optional_children import Listeners, optional_children
 from gateway.service.running_rig.starting import StartError
 from tests.control.bench import bsfm
@@ -227,3 +229,17 @@ def test_a_taken_address_ends_the_start_unless_any_will_do() -> None:
 def test_a_page_that_others_can_reach_needs_a_token() -> None:
     with pytest.raises(StartError, match=r"^E128 0\.0\.0\.0:0 can be reached from other machines: .*token"):
         Listeners({}).open(demo(), {"web": ["0.0.0.0", 0]})
+
+
+@pytest.mark.parametrize("zone", ["JST-9", "HST10"])
+def test_a_calibration_s_date_without_a_zone_is_utc(monkeypatch: pytest.MonkeyPatch, zone: str) -> None:
+    """Whatever the machine's own is: a page showed one of this hour as half a day old."""
+    monkeypatch.setenv("TZ", zone)
+    time.tzset()
+    try:
+        moment = datetime.now(UTC) - timedelta(hours=12.0)
+        for date in (moment.isoformat(), moment.replace(tzinfo=None).isoformat()):
+            assert _age_s(date) == pytest.approx(12.0 * 3600.0, abs=5.0)
+    finally:
+        monkeypatch.undo()
+        time.tzset()

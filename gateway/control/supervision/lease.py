@@ -38,6 +38,7 @@ class Lease:
         if self._is_beat(heartbeat, who, channel):
             self._changed_s, self._master = now_s, who
             self._unbeaten.pop(who, None)
+            self._beats.pop(who, None)  # whoever beats last stays longest
             self._beats[who] = heartbeat, now_s
             if len(self._beats) > _MOST_MASTERS:
                 del self._beats[next(iter(self._beats))]

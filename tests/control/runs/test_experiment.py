@@ -7,6 +7,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.control.runs import experiment_schedule
 from gateway.control.runs.experiment_plan import ExperimentPlan, Move, MoveKind, Part, plan_faults
+from gateway.control.runs.experiment_run import ExperimentRun
 from gateway.control.runs.experiment_schedule import Schedule, schedule_of, segments_of
 from gateway.control.runs.ladder_stairs import highest_voltage_v
 from gateway.registers.words import CalibrationPhase, State
@@ -95,6 +96,7 @@ def test_an_empty_plan_and_an_endless_one_are_refused() -> None:
     assert [path for path, _ in plan_faults(ExperimentPlan(name="x", parts=()))] == [("parts",)]
     endless = plan(Move(do=MoveKind.REVERSALS, size_share=0.1, times=1000, hold_s=3600.0))
     assert "allowed up to 7200 s" in next(plan_faults(endless))[1]
+    assert "the parts take 0 s" in next(plan_faults(plan(Move(do=MoveKind.STEP, to_v=3.0))))[1]
 
 
 def begun(bench: Bench, asked: ExperimentPlan) -> Bench:
@@ -226,3 +228,10 @@ def test_what_a_plan_is_called_writes_on_nobodys_terminal(path: tuple[str | int,
     part = Part(name=texts["part"], moves=(Move(do=MoveKind.DWELL, hold_s=1.0),))
     asked = ExperimentPlan(name=texts["name"], parts=(part,), columns=(texts["columns"],), by_hand=(texts["by_hand"],))
     assert [fault[0] for fault in plan_faults(asked)] == [path]
+
+
+def test_the_check_of_a_plan_begins_at_the_safe_voltage_of_the_rig() -> None:
+    """From 0 V a rig that keeps its tool up with 2 V would let it down first."""
+    rig = replace(settings(), limits=replace(LIMITS, safe_voltage_v=2.0, voltage_min_v=2.0))
+    run = ExperimentRun(plan(Move(do=MoveKind.STEP, to_v=6.0, hold_s=1.0), check=True), rig, bsfm(), 0.0)
+    assert min(stair.voltage_v for stair in run._check.stairs) == 2.0

@@ -65,12 +65,21 @@ def test_a_cell_that_has_repeated_itself_at_rest_is_looked_at_anew_from_an_enabl
 
 
 @pytest.mark.parametrize(
-    ("cell_n", "words"),
-    [(8.0, "92.0 N of it are the payload's weight"), (100.0, "kgf and N mixed up"), (-92.0, "kgf and N mixed up")],
+    ("contact_n", "cell_n", "direction", "words"),
+    [
+        (100.0, 8.0, 1.0, "92.0 N of it are the payload's weight"),
+        (100.0, 8.0, -1.0, ": -92.0 N of it are the payload's weight"),
+        (100.0, 100.0, 1.0, "kgf and N mixed up"),
+        (100.0, -92.0, 1.0, "kgf and N mixed up"),
+        (-100.0, -100.0, 1.0, "kgf and N mixed up"),
+    ],
 )
-def test_a_force_that_is_too_large_by_a_payload_alone_is_told_so(cell_n: float, words: str) -> None:
-    """A master has written 9 kg for 0.9: neither a jam, nor the cell's unit."""
-    one, reading = detector(), WELL._replace(contact_n=100.0, cell_n=cell_n)
+def test_a_force_that_is_too_large_by_a_payload_alone_is_told_so(
+    contact_n: float, cell_n: float, direction: float, words: str
+) -> None:
+    """A master has written 9 kg for 0.9: neither a jam, nor the cell's unit; in a pull the weight acts the other way."""
+    one, reading = detector(), WELL._replace(contact_n=contact_n, cell_n=cell_n)
+    one.direction = direction
     response = ExpectedForce(bsfm(), 0.1, 0.0)
     for _ in range(3):
         one.observe(reading, response, 1.0, True)

@@ -227,3 +227,14 @@ def test_only_a_new_and_usable_reading_says_that_the_force_is_off(
         off = Reading(contact_n=5.0, is_new=is_new, is_usable=is_usable, interval_s=0.01)
         check.judge_force(demand(), at(0.01 * k)._replace(reading=off), 10.0, 10.0)
     assert check.unreachable is is_missed
+
+
+def test_a_force_that_is_off_in_the_mean_is_called_unsteady_no_more() -> None:
+    """One cause at a time: whoever looks for noise does not look for air."""
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(1100):
+        force_n = 10.0 + (-1) ** k * 1.5 if k < 700 else 2.0
+        reading = Reading(contact_n=force_n, is_new=True, is_usable=True, interval_s=0.01)
+        check.judge_force(demand(), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+        assert not (check.is_noisy and check.unreachable)
+    assert check.unreachable

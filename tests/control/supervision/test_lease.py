@@ -85,3 +85,15 @@ def test_a_rig_that_says_no_more_than_a_length_goes_to_the_safe_voltage_behind_i
     assert bench.last.voltage_v > 0.0
     output = bench.run(0.1)
     assert (output.fault, output.voltage_v) == (FaultCode.MASTER_LOST, 0.0)
+
+
+def test_of_many_masters_those_are_known_that_have_beaten_last() -> None:
+    """Memory is bounded: whose beat is forgotten would seem to beat with the frame that it has hung with."""
+    lease = Lease(0.5)
+    for number in range(64):
+        lease.observe(10.0 + number, 1000 + number, f"10.0.1.{number}")
+        lease.observe(10.0 + number, 2000 + number, "10.0.0.1")  # who has the lease all the while, and hangs then
+    lease.observe(100.0, 7, "10.0.0.9")
+    for beat, who in ((2063, "10.0.0.1"), (1062, "10.0.1.62"), (7, "10.0.0.9")):
+        assert not lease.would_have_beaten_since(200.0, beat, who), who
+    assert lease.would_have_beaten_since(200.0, 1000, "10.0.1.0"), "who has been forgotten"

@@ -96,3 +96,12 @@ def test_a_tare_of_before_a_silence_of_the_cell_is_doubted_once(silent_s: float,
     if lost != "under force":
         bench.write(control_word=ControlBit.TARE)
         assert bench.last.warnings == WarningBit(0), "the next tare ends it"
+
+
+def test_a_fast_cell_s_zero_is_the_mean_of_its_readings_and_not_one_of_each_few() -> None:
+    """1000 readings a second that swing by 2 N to either side."""
+    zero = Zero(settings().supervision)
+    for number in range(200):
+        zero.observe(10.0 + (-1) ** number * 2.0, 0.001)
+    assert zero.unsteady(0.0) == ""
+    assert zero.take(0.0) == pytest.approx(10.0)

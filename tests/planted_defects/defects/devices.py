@@ -71,4 +71,7 @@ DEFECTS = (
            "        except PortError:\n            self._release()\n            raise\n\n    def _look",
            "        except PortError:\n            raise\n\n    def _look",
            ("ports/test_port_failures.py",)),
+    Defect("kilograms in capitals are no unit", "devices/force_reading.py",
+           "\"kgF\", \"KGF\"), \"kg\")", "\"kgF\"), \"kg\")",
+           ("devices/test_units_beside_blanks.py",)),
 )  # fmt: skip

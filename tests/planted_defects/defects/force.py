@@ -108,4 +108,8 @@ DEFECTS = (
            "return now_s - max(self._vented_s, self._told_s) >= self.settings.dwell_s", "return True", ("control/valve",)),
     Defect("the valve is told under pressure", "control/valve/valve_switch.py",
            "return self.commanded if self._vented_s < inf else None", "return self.commanded", ("control/valve",)),
+    Defect("what was on its way before a start arrives behind it", "control/force_loop/transport_delay.py",
+           "        self._past: deque[tuple[float, float]] = deque()\n",
+           "        self._past: deque[tuple[float, float]] = getattr(self, \"_past\", deque())\n",
+           ("control/force_loop/feedforward/test_trend_and_lead_by_number.py",)),
 )  # fmt: skip

@@ -106,4 +106,11 @@ DEFECTS = (
            "        self.outcome.resets_device = True\n        if self.state is State.OFF:\n            return\n",
            "        if self.state is State.OFF:\n            return\n        self.outcome.resets_device = True\n",
            ("control/test_states.py",)),
+    Defect("a force that is off in the mean is called unsteady", "control/supervision/in_band.py",
+           "if now_s - self._otherwise_since_s > longest_s or self._band.unreachable:",
+           "if now_s - self._otherwise_since_s > longest_s:",
+           ("control/supervision/test_in_band.py",)),
+    Defect("a zero is one reading of each few", "control/tare.py",
+           "self._recent_n.append(self._sum_n / self._samples)", "self._recent_n.append(force_n)",
+           ("control/zero/test_zero.py",)),
 )  # fmt: skip

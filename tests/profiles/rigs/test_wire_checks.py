@@ -117,6 +117,17 @@ def test_half_a_step_of_an_output_must_fit_into_the_band_and_no_whole_one(tmp_pa
     assert "output.device" not in faults
 
 
+@pytest.mark.parametrize(("band_n", "is_fault"), [(0.97, True), (0.99, False)])
+def test_a_band_holds_one_count_of_the_cell_each_way(band_n: float, is_fault: bool, tmp_path: Path) -> None:
+    """A tenth of a kilogram, 0.981 N."""
+    counts = {
+        "cell__stream__frame": "{status:ST|US|OL},{force:+08.1f}{unit:kg|lb|g|N}",
+        "rig__supervision__sample_quantum_n": 1.0,
+    }
+    faults, _ = told(tmp_path, **counts, rig__defaults__in_band_tolerance_n=band_n)
+    assert ("defaults.in_band_tolerance_n" in faults) is is_fault
+
+
 @pytest.mark.parametrize(("sign", "zero_count"), [(1, 80_000), (-1, -80_000)])
 def test_a_display_of_raw_counts_ends_as_far_from_its_zero_as_a_push_can_go(
     sign: int, zero_count: int, tmp_path: Path

@@ -43,3 +43,13 @@ def test_the_highest_number_is_not_given_again_whatever_is_missing_before_it(tmp
     recorder = Recorder(paths[0].parent, {}, ("time_s",))
     recorder.close()
     assert recorder.number == 7
+
+
+def test_of_the_numbers_that_are_not_given_again_the_highest_alone_is_marked(tmp_path: Path) -> None:
+    """Who deletes each recording that he has made would have a mark of each for good."""
+    folder = tmp_path / "recordings"
+    for _ in range(3):
+        recorder = Recorder(folder, {}, ("time_s",))
+        recorder.close()
+        assert delete_recording(recorder.path, "") == ""
+    assert [path.name for path in folder.iterdir()] == ["0003.gone"]

@@ -151,3 +151,11 @@ def test_who_looks_whether_a_recording_is_being_written_is_not_taken_for_who_wri
     with path.open("rb") as other:
         fcntl.flock(other, fcntl.LOCK_SH)
         assert not is_being_recorded(path)
+
+
+@pytest.mark.parametrize("earlier", [[True], [1.0], 3, ["1"]])
+def test_what_a_recording_continues_are_numbers_of_others(earlier: object, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, {"continues": earlier}, ("time_s",))
+    recorder.close()
+    with pytest.raises(RecordingError, match="continues is no list of recordings' numbers"):
+        read_recording(recorder.path)

@@ -11,6 +11,7 @@ from gateway.bsfm.ladder.plan import LABELS
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import Recorder, read_recording, recording_paths
 from gateway.recording.calibrations_used import tell_changes
+from gateway.recording.care import summaries
 from gateway.recording.care.keeping import choose_prunable
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.label import check_name, check_note
@@ -74,6 +75,34 @@ def test_a_file_that_has_grown_within_one_tick_of_the_clock_is_read_again(tmp_pa
         os.utime(recorder.path, ns=(status.st_atime_ns, status.st_mtime_ns))
         assert [summary["rows"] for summary in list_summaries(tmp_path)] == [rows]
     recorder.close()
+
+
+def test_a_file_that_another_one_has_replaced_within_a_second_is_read_again(tmp_path: Path) -> None:
+    path = tmp_path / "recordings" / "0001.fgr"
+    for at_ns, calibration in enumerate((3, 4, 4), 1_700_000_000 * 10**9):
+        recorder = Recorder(tmp_path / "beside", {"calibration": calibration}, ("time_s",))
+        recorder.close()
+        path.parent.mkdir(exist_ok=True)
+        recorder.path.replace(path)
+        os.utime(path, ns=(at_ns, at_ns))
+        assert [summary["calibration"] for summary in list_summaries(tmp_path)] == [calibration]
+
+
+def test_what_has_changed_is_read_once_and_what_is_gone_is_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many recordings as before, or fewer, are no reason to keep what was known of them."""
+    for _ in range(2):
+        Recorder(tmp_path / "recordings", {}, ("time_s",)).close()
+    first, second = recording_paths(tmp_path)
+    list_summaries(tmp_path)
+    os.utime(first, (1, 1))
+    list_summaries(tmp_path)
+    monkeypatch.setattr(summaries, "summary_of", lambda path: pytest.fail(f"{path} was read again"))
+    assert len(list_summaries(tmp_path)) == 2
+    second.unlink()
+    assert len(list_summaries(tmp_path)) == 1
+    assert second.name not in (tmp_path / "recordings" / ".summaries.json").read_text()
 
 
 def test_a_change_of_calibration_is_told_by_the_time_since_the_first_row(tmp_path: Path) -> None:

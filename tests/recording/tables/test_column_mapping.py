@@ -29,6 +29,7 @@ def test_a_file_says_the_same_as_the_text(tmp_path: Path) -> None:
     text = "time_s=1:ms,force_n=7:n,position_mm=5,tilt_deg=Angle of tool"
     assert column_mapping(str(path)) == column_mapping(text)
     assert column_mapping(None) is None
+    assert column_mapping(str(path.rename(tmp_path / "ZILLEN.YAML"))) == column_mapping(text)
 
 
 @pytest.mark.parametrize(
@@ -56,6 +57,7 @@ def test_a_wrong_text_is_told_with_what_is_allowed(text: str, words: str) -> Non
         ("time_s: 1\ntime_s: 2\n", "map.yaml:2:1"),
         ("force_n: {column: 2, units: n}\n", "is no column"),
         ("force_n: 2:bar\n", "map.yaml: 'bar' is no unit"),
+        ("force_n: {column: 2, unit: ''}\n", "map.yaml: '' is no unit"),
     ],
 )
 def test_a_wrong_file_is_told_with_its_place(text: str, words: str, tmp_path: Path) -> None:
@@ -144,6 +146,14 @@ def test_units_of_amplifiers_by_their_definitions(unit: str, newton: float) -> N
 )
 def test_a_unit_by_another_name_is_that_unit(written: str, quantity: str, unit: str) -> None:
     assert unit_of(written, quantity) == unit
+
+
+@pytest.mark.parametrize(
+    ("written", "quantity"), [("MPA", "pressure"), ("MN", "force"), ("MV", "voltage"), ("MS", "time")]
+)
+def test_capitals_that_may_be_two_units_are_none(written: str, quantity: str) -> None:
+    """A thousand millionths, or a million: 6 MPA are 60 bar, or nothing."""
+    assert unit_of(written, quantity) is None
 
 
 def test_the_same_unit_changes_no_bit() -> None:

@@ -100,3 +100,24 @@ def test_what_drives_is_missing_where_a_logger_wrote_no_value(name: str, value: 
     assert not any("in mV" in note for note in found.notes)
     millivolts = measurement_of(Recording(Path("run.csv"), {}, table | {name: 1.0e3 * drive}, TIME_S.size, False))
     assert not any("are below" in note for note in millivolts.notes), "all of them: that is another unit"
+
+
+def test_readings_at_the_end_of_the_range_are_in_the_measurement_and_not_judged() -> None:
+    force_n = np.minimum(FORCE_N, 26.0)
+    found = measurement_of(
+        Recording(Path("run.csv"), {}, {"time_s": TIME_S, "command_v": VOLTS, "force_n": force_n}, TIME_S.size, False)
+    )
+    assert np.array_equal(found.usable, force_n < 26.0)
+
+
+def test_what_is_missing_is_told_by_the_row_of_the_table_although_others_before_it_are_left_out() -> None:
+    table = {
+        "time_s": TIME_S.copy(),
+        "command_v": VOLTS,
+        "force_n": FORCE_N,
+        "temperature_c": np.full(TIME_S.size, 20.0),
+    }
+    table["time_s"][[3, 4]] = np.nan
+    table["temperature_c"][1000] = -300.0
+    found = measurement_of(Recording(Path("run.csv"), {}, table, TIME_S.size, False))
+    assert any("(the first: run.csv, row 1001)" in note for note in found.notes)

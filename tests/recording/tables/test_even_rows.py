@@ -50,6 +50,12 @@ def test_a_reading_that_is_no_witness_is_in_no_row() -> None:
     assert 25 < int(np.sum(whole.usable)) - int(np.sum(found.usable)) <= int(np.sum(overloaded))
 
 
+def test_a_row_of_which_one_reading_is_repeated_is_one() -> None:
+    repeated = np.arange(TIME_S.size) % 10 == 5
+    found = resample_evenly(replace(MEASUREMENT, repeated=repeated), *sent(TIME_S))
+    assert int(np.sum(found.repeated)) == pytest.approx(TIME_S.size / 10, rel=0.02)
+
+
 def test_rows_are_even_and_the_force_is_that_of_their_times() -> None:
     found = resample_evenly(MEASUREMENT, *sent(TIME_S))
     assert np.diff(found.time_s) == pytest.approx(found.even_s)

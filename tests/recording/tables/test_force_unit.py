@@ -67,3 +67,20 @@ def test_a_unit_that_is_none_of_force_is_refused_with_what_is_there(unit: str, t
     ):
         read_table(path)
     assert read_table(path, column_mapping("force_n=force_n:n")).columns["force_n"][1] == 1.0
+
+
+def test_a_row_of_units_that_says_nothing_leaves_the_unit_of_the_header(tmp_path: Path) -> None:
+    """`-` stands there for none, or for what the header says already."""
+    path = tmp_path / "table.csv"
+    path.write_text(f"Time,Voltage [V],Force [kgf]\ns,-,-\n{ROWS}")
+    np.testing.assert_allclose(read_table(path).columns["force_n"][:3], [0.0, KGF, 2 * KGF])
+
+
+@pytest.mark.parametrize("last", ["gr\xfc", "gr\xfcn", "\xfc"])
+def test_a_table_that_ends_with_a_letter_of_windows_is_read_as_that(last: str, tmp_path: Path) -> None:
+    """A whole file does not end amid a letter, as a piece of it may."""
+    path = tmp_path / "table.csv"
+    rows = "".join(f"{k},{k},ja\n" for k in range(9))
+    path.write_bytes(f"time_s,force_n,note\n{rows}9,9,{last}".encode("cp1252"))
+    recording = read_table(path)
+    assert recording.rows == 10 and any("Windows-1252" in note for note in recording.notes)

@@ -183,6 +183,10 @@ def test_what_is_no_stamp_is_none(cell: str) -> None:
 def test_clocks_that_pass_midnight_go_on_and_stamps_that_nobody_knows_stay_unknown() -> None:
     clocks = np.array([parse_stamp(clock) for clock in ("23:59:59.5", "00:00:00.5", "00:00:01.5")], dtype=float)
     assert np.diff(seconds_from_stamps(clocks)) == pytest.approx([1.0, 1.0])
+    twice = np.array([parse_stamp(clock) for clock in ("20:00:00", "04:00:00", "12:00:00") * 2], dtype=float)
+    assert np.diff(seconds_from_stamps(twice)) == pytest.approx(8.0 * 3600.0), "two nights"
+    set_back = np.array([parse_stamp(clock) for clock in ("12:00:02", "12:00:01", "12:00:03")], dtype=float)
+    assert np.diff(seconds_from_stamps(set_back)) == pytest.approx([-1.0, 2.0]), "a clock that was set back is no night"
     assert np.isnan(seconds_from_stamps(np.full(3, np.nan))).all()
 
 

@@ -126,9 +126,9 @@ def test_commit_is_passed_on_with_the_staged_words_and_reads_zero(bank, master):
     bank.staging.on_commit = lambda action, words, peer: seen.append((action, len(words), words[288:290], peer))
     master.write(1144, 5, 1)
     assert (master.word(1144), master.word(1145)) == (5, 0)
-    master.write(1145, 2)
-    master.write(1145, 0)
-    master.write(1145, 3)
+    for word in (2, 0, 3):
+        master.write(1145, word)
+        assert master.word(1145) == 0
     assert [entry[0] for entry in seen] == [CommitAction.COMMIT, CommitAction.DRY_RUN, CommitAction.ROLLBACK]
     assert seen[0][1:] == (400, b"\0\5", master.peer)
 
@@ -139,6 +139,21 @@ def test_a_commit_that_its_server_refuses_changes_nothing(bank, master):
 
     bank.staging.on_commit = refuse
     assert master.refusal(master.write, 1144, 5, 1).code == 6
+
+
+def test_words_that_a_refused_commit_has_taken_back_are_those_of_who_staged_them_before(bank, master, other):
+    """Else the other one could commit a set that he has not staged, and who has staged all of it could not."""
+    seen = []
+    bank.staging.on_commit = lambda action, words, peer: seen.append(action)
+    master.write(1144, 5)
+    for word in (CommitAction.COMMIT, CommitAction.DRY_RUN):
+        assert other.refusal(other.write, 1145, word).reason is RefusalReason.BUSY
+    other.write(1145, CommitAction.ROLLBACK)  # whoever has staged what
+    bank.staging.on_commit = None
+    assert other.refusal(other.write, 1144, 6, CommitAction.COMMIT).reason is RefusalReason.COEFFICIENTS
+    bank.staging.on_commit = lambda action, words, peer: seen.append(action)
+    master.write(1145, CommitAction.COMMIT)
+    assert seen == [CommitAction.ROLLBACK, CommitAction.COMMIT]
 
 
 @pytest.mark.parametrize(
@@ -190,11 +205,12 @@ def test_a_slot_is_selected_by_its_number(bank, master, register_map):
     bank.staging.on_select = lambda slot, peer: seen.append((slot, peer))
     master.write(1149, 3)
     assert (seen, master.word(1149)) == ([(3, master.peer)], 3)
+    master.write(1149, 7)
     with pytest.raises(Refusal, match=r"allowed 0 \.\. 7"):
         master.write(1149, 8)
     value = register_map.find("refusal_value")
     assert value.decode(bank.read_registers(value.address, value.words)) == 8
-    assert (len(seen), master.word(1149)) == (1, 3)
+    assert (len(seen), master.word(1149)) == (2, 7)
 
 
 def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
@@ -210,6 +226,16 @@ def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
     register = register_map.find("falling_b_1@active")
     assert register.decode(bank.read_registers(register.address, 2)) == 30.0
     assert bank.read_registers(register_map.find("slip_stops@active").address, 1) == b"\0\2"
+
+
+@pytest.mark.parametrize(
+    ("limits_n", "shown_n"), [((), (0.0, 60.0)), ((2.0, 40.0), (2.0, 40.0)), ((-5.0, 80.0), (0.0, 60.0))]
+)
+def test_the_active_set_tells_the_forces_that_it_allows(bank, register_map, limits_n, shown_n):
+    """Its own limits, and no more than its branches reach."""
+    bank.set_active_model(replace(CALIBRATION, force_limits_n=limits_n))
+    low, high = (register_map.find(f"force_{end}@active") for end in ("low", "high"))
+    assert tuple(one.decode(bank.read_registers(one.address, 2)) for one in (low, high)) == shown_n
 
 
 def test_sets_that_cannot_be_carried_are_said():

@@ -148,9 +148,15 @@ def test_a_frozen_cell_repeats_what_it_said_whatever_the_machine_does(world: Wor
 
 @pytest.mark.parametrize("inverted", [False, True])
 def test_a_cell_beyond_its_range_says_so_at_either_end(world: World, inverted: bool) -> None:
-    assert world.sample().quality is not Quality.OVERLOAD
-    world.set(cell__scale=100.0, cell__inverted=inverted)
-    assert world.sample().quality is Quality.OVERLOAD
+    held_n = world.sample().force_n
+    for share, is_beyond in (
+        (0.9, False),
+        (1.1, True),
+        (30.0, True),
+    ):  # of its range, and more than its display has room for
+        world.set(cell__scale=share * world._range_n / held_n, cell__inverted=inverted)
+        world.wait(0.5)  # else it shows what it has measured before
+        assert (world.sample().quality is Quality.OVERLOAD) is is_beyond
 
 
 def test_a_cell_that_is_set_to_kilograms_shows_a_tenth(world: World) -> None:

@@ -116,6 +116,9 @@ def test_a_delay_gives_what_was_so_long_ago() -> None:
     delay.restart(5.0)
     assert [delay.advance(float(k), 0.125) for k in range(5)] == [5.0, 5.0, 0.0, 1.0, 2.0]
     assert TransportDelay(0.0).advance(7.0, 0.1) == 7.0
+    delay.advance(8.0, 0.125)
+    delay.restart(2.0)
+    assert [delay.advance(3.0, 0.125) for _ in range(4)] == [2.0, 2.0, 3.0, 3.0], "nothing of before is on its way"
 
 
 def test_an_error_that_falls_with_the_lag_is_taken_for_one_that_goes_away_and_one_that_stays_is_not() -> None:

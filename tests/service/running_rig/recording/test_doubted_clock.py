@@ -174,3 +174,12 @@ def test_what_was_recorded_before_anybody_had_set_the_clock_goes_in_its_turn(tmp
     limit = Retention(days=90.0, bytes=1_000_000)
     object.__setattr__(limit, "bytes", 2 * paths[0].stat().st_size)
     assert [one.path for one in choose_prunable(paths, limit, "", NOW_S)] == paths[:1]
+
+
+@pytest.mark.parametrize(("ago_days", "kind"), [(0.4, ClockDoubt.NONE), (0.6, ClockDoubt.AHEAD)])
+def test_where_recordings_stay_for_less_than_a_day_a_clock_is_doubted_by_those_of_hours_ago(
+    ago_days: float, kind: ClockDoubt, tmp_path: Path
+) -> None:
+    record(tmp_path, days_ago=ago_days)
+    doubt = doubt_clock(recording_paths(tmp_path), 0.5, NOW_S)
+    assert doubt.kind is kind and ("of more than 6 h ago" in doubt.sentence) is (kind is ClockDoubt.AHEAD)

@@ -19,6 +19,7 @@ from gateway.recording.tables.column_names import CALIBRATION
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS, row_of
 from gateway.service.running_rig.recording.recordings import LONGEST_S, RUN_COLUMNS, Recordings
+from gateway.service.running_rig.recording.run_recording import HANGS_S
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
@@ -63,12 +64,14 @@ def test_a_recording_names_the_calibration_that_is_in_use_now(recordings: Record
 
 
 def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings) -> None:
+    wanted: list[WantedRecording | None] = []
+    recordings.on_wanted = wanted.append
     recordings.start(for_s=2.0)
     recordings.flush(100.0)
     recordings.flush(101.99)
-    assert recordings.status()["recording"]
+    assert recordings.status()["recording"] and wanted[-1]
     recordings.flush(102.0)
-    assert recordings.status() == {"recording": None}
+    assert recordings.status() == {"recording": None} and wanted[-1] is None
     assert [line for line in recordings._log if "ends after 2 s" in line]
 
 
@@ -129,12 +132,25 @@ def test_one_that_goes_on_for_days_goes_on_in_another_file(recordings: Recording
 def test_each_row_says_the_calibration_that_was_in_use_for_it(recordings: Recordings, tmp_path: Path) -> None:
     decision = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
     recordings.start()
-    for number in (3, 3, 4):
+    for at_s, number in ((1000.0, 3), (1000.25, 3), (1000.5, 4)):
         recordings.calibration = replace(demo().calibration, number=number)
-        recordings.append(ForceSample(1.0, 12.5, Quality.OK, time_s=1.0), decision, LineState(0.0, 0.0, 0.0))
+        recordings.append(ForceSample(1.0, 12.5, Quality.OK, time_s=at_s), decision, LineState(0.0, 0.0, 0.0))
     recordings.stop()
     (path,) = recording_paths(tmp_path)
-    assert read_recording(path).columns[CALIBRATION].tolist() == [3.0, 3.0, 4.0]
+    columns = read_recording(path).columns
+    assert columns[CALIBRATION].tolist() == [3.0, 3.0, 4.0]
+    assert columns["time_s"].tolist() == [0.0, 0.25, 0.5], "since its own first row"
+
+
+def test_a_cell_that_is_silent_for_long_is_no_disk_that_hangs(recordings: Recordings) -> None:
+    decision = Controller(demo().control, CalibrationInUse(bsfm(), 1)).safe_output(FaultCode.NONE)
+    recordings.start()
+    for at_s in (1.0, 2.0, 2.0 + 2.0 * HANGS_S):
+        recordings.append(ForceSample(1.0, 12.5, Quality.OK, time_s=at_s), decision, LineState(0.0, 0.0, 0.0))
+        recordings.flush(at_s)
+        recordings.flush(at_s + 1.0)
+    assert recordings.status()["rows"] == 3 and not [line for line in recordings._log if "E402" in line]
+    recordings.stop()
 
 
 def test_with_each_next_file_it_is_looked_at_once_what_there_is_no_room_for(tmp_path: Path) -> None:

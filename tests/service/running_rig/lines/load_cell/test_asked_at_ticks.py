@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.devices.device_checks.identity import Identity
 from tests.service.running_rig.lines.load_cell.test_load_cell_line import POLLED, READING, Wire
 
 
@@ -48,3 +49,18 @@ def test_a_question_that_came_much_too_late_is_not_made_up_for() -> None:
     asked = len(wire.asked)
     wire.tick(0.05)
     assert (asked, len(wire.asked)) == (2, 2)
+
+
+def test_one_lost_answer_of_a_slow_cell_is_no_silence_behind_which_another_may_be() -> None:
+    """Of one reading a second each lost one would cost a question what it is, and readings meanwhile."""
+    identity = Identity(ask="ID?", answer="ID {model:s}", models=("A1",))
+    wire = Wire(replace(POLLED, identity=identity, read_force=replace(READING, rate_hz=1.0)))
+    wire.tick()
+    wire.exchange.receive(b"ID A1\r\n", wire.now_s)
+    wire.answer()
+    for _ in range(145):
+        wire.tick()
+    assert set(wire.asked[1:]) == {b"W?\r\n"}
+    for _ in range(20):
+        wire.tick()
+    assert wire.asked[-1] == b"ID?\r\n", "half a second beyond its period is one"
