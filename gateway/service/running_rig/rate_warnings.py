@@ -87,10 +87,11 @@ class LineNoise(_RateWarning):
         what our loop gave up as overdue, and comes then, is read from its middle on; empty where nobody was.
         """
         dropped = [one.data for one in messages if isinstance(one, Garbage)]
-        if messages:
-            self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         if not dropped:
+            if messages:
+                self._recent.add(now_s, 0, len(messages))
             return ""
+        self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         self._last_s = now_s
         count, total, size = self._recent.totals()
         if self.is_on or count < LEAST or count <= SHARE * total:
