@@ -125,7 +125,7 @@ class StatusWitness:
         at_s, beat = self._echoes.popleft()
         while self._beats and self._beats[0][0] < at_s - BEATEN_S:
             self._beats.popleft()
-        if beat not in (0, self._beat) and not any(one == beat or one != one for _, one in self._beats):
+        if beat not in (0, self._beat) and not any(one == beat or one != one for _, one in reversed(self._beats)):
             self._observer.complain("I7", f"heartbeat {beat} is used, which nobody has written", at_s)
         self._beat = beat
 
