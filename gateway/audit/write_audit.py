@@ -118,7 +118,7 @@ class WriteAudit:
     def _note_edges(self, peer: Peer, edges: int, admitted: AdmittedWrite, states: _States) -> None:
         rises, falls = (admitted.kept & ~states.word) | edges, states.word & ~admitted.kept
         told = []
-        for bit in ControlBit:
+        for bit in ControlBit if rises | falls else ():
             if rises & bit:
                 told.append(self._count(peer, str(bit.name).lower(), _AT_ONCE_EDGE, (0.0, 1.0)))
             elif falls & bit:

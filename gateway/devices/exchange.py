@@ -4,6 +4,7 @@ Checked when built: a template that means nothing is told to its author, not to 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil, floor
 from typing import Annotated, Final
 
@@ -55,6 +56,7 @@ class Scale:
         return ceil(self.device[0] * per_unit - _GRAIN), floor(self.device[1] * per_unit + _GRAIN)
 
 
+@lru_cache  # asked for at each exchange, of the few ranges of a rig's devices
 def _scale(device: Span, physical: Span) -> Scale:
     if device[0] >= device[1] or physical[0] >= physical[1]:
         sides = " and ".join(f"{low:g} .. {high:g}" for low, high in (device, physical))
@@ -76,7 +78,7 @@ class VoltageRange:
     @property
     def scale(self) -> Scale:
         """The scale between the device's numbers and volts."""
-        return Scale(self.device, self.voltage_v)
+        return _scale(self.device, self.voltage_v)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,7 +95,7 @@ class PressureRange:
     @property
     def scale(self) -> Scale:
         """The scale between the device's numbers and pascals."""
-        return Scale(self.device, self.pressure_pa)
+        return _scale(self.device, self.pressure_pa)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,7 @@
 """A profile's templates at work: numbers into whole lines and back, for both ends of a wire."""
 
 from dataclasses import dataclass, field
+from typing import Final
 
 from gateway.devices.binary.raw_bytes import ByteSplitter, TextSplitter
 from gateway.devices.binary.rtu_framing import RtuSplitter, answers, requests, rtu_frame
@@ -13,6 +14,7 @@ from gateway.devices.profile import DeviceProfile
 from gateway.devices.template import compile_template
 
 Splitter = LineSplitter | RtuSplitter | ByteSplitter
+_MOST_LINES: Final = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +24,7 @@ class Grammar:
     profile: DeviceProfile
     _numbers: dict[str, tuple[Field | None, int]] = field(default_factory=dict, compare=False)
     _around: dict[str, dict[str, Value]] = field(default_factory=dict, compare=False)
+    _lines: dict[tuple[str, float], bytes] = field(default_factory=dict, compare=False)
 
     @property
     def set_voltage(self) -> VoltageExchange:
@@ -139,8 +142,12 @@ class Grammar:
         return self._around[template]
 
     def number_line(self, template: str, number: float) -> bytes:
-        """Return the device's line with this number in it."""
-        return self.line(self.number_body(template, number))
+        """Return the device's line with this number in it; of what stands still it is the same again and again."""
+        if (template, number) not in self._lines:
+            if len(self._lines) >= _MOST_LINES:
+                self._lines.clear()
+            self._lines[template, number] = self.line(self.number_body(template, number))
+        return self._lines[template, number]
 
     def words(self, template: str) -> str:
         """Return a sentence as text, with the profile's constants; its other numbers are 0. An empty one is none."""

@@ -163,12 +163,12 @@ class DeviceProfile:
     @property
     def own_watchdog(self) -> Watchdog | None:
         """The device's watchdog, None where it has none."""
-        return None if self.watchdog == "none" else self.watchdog
+        return None if isinstance(self.watchdog, str) else self.watchdog
 
     @property
     def own_identity(self) -> Identity | None:
         """Question for what the device is, None where it cannot be asked."""
-        return None if self.identity == "none" else self.identity
+        return None if isinstance(self.identity, str) else self.identity
 
     def number_in(self, template_text: str) -> Field | None:
         """Return the field that carries the number: the only one that is neither a constant nor a word, or {value:...}."""

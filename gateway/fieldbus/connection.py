@@ -169,7 +169,7 @@ class Connection(asyncio.Protocol):
         answers: list[bytes] = []
         lost: FramingLost | None = None
         try:
-            while self._may_ask(len(answers)) and (request := self._framer.take()) is not None:
+            while self._framer and self._may_ask(len(answers)) and (request := self._framer.take()) is not None:
                 answers.append(self._answer(request))
         except FramingLost as caught:
             lost = caught

@@ -7,7 +7,7 @@ clamped there, and exact in the float blocks.
 
 from collections.abc import Sequence
 from math import isfinite
-from operator import attrgetter
+from operator import attrgetter, mul
 from struct import Struct
 from typing import Final, NamedTuple
 
@@ -65,6 +65,8 @@ _UNITS_PER_SI: Final = {
     "kPa": 1.0e-3,
     "permille": 1.0e3,
 }
+_BEYOND: Final = -1
+"""In place of a count: the register does not carry the number."""
 BANK_REGISTERS: Final = ("owner_ip", "refusal_address", "refusal_reason", "refusal_value")
 
 
@@ -76,6 +78,12 @@ class _Scale(NamedTuple):
     low: int
     high: int
     unavailable: int
+
+    def count_beyond(self, number: float) -> int:
+        """What the register shows of a number that it does not carry."""
+        if not isfinite(number):
+            return self.unavailable & 0xFFFF
+        return (self.high if number * self.counts_per_unit > self.high else self.low) & 0xFFFF
 
 
 class _Run(NamedTuple):
@@ -105,6 +113,9 @@ class StatusBlock:
         self._image = image
         self._fields = attrgetter(*(_SOURCES[register.name] for register in published))
         self._scales = tuple(_scale(register) for register in published)
+        self._units_per_si = tuple(scale.units_per_si for scale in self._scales)
+        self._counts_per_unit = tuple(scale.counts_per_unit for scale in self._scales)
+        self._limits = tuple((scale.low, scale.high) for scale in self._scales)
         self._runs = tuple(_runs(register_map, published))
         self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
         self._shown_owner: tuple[str | None, str] | None = None
@@ -112,19 +123,16 @@ class StatusBlock:
 
     def publish(self, status: Status) -> None:
         """Write everything that control and service know into all three faces."""
-        counts: list[int] = []
-        numbers: list[float] = []
-        for value, (units_per_si, counts_per_unit, low, high, unavailable) in zip(
-            self._fields(status), self._scales, strict=True
-        ):
-            number = value * units_per_si
-            scaled = number * counts_per_unit
-            if low <= scaled <= high:
-                counts.append(round(scaled) & 0xFFFF)
-                numbers.append(number)
-            else:
-                counts.append((unavailable if not isfinite(number) else high if scaled > high else low) & 0xFFFF)
-                numbers.append(carried_by_float32(number))
+        numbers = list(map(mul, self._fields(status), self._units_per_si))
+        counts = [
+            round(count) & 0xFFFF if low <= count <= high else _BEYOND
+            for count, (low, high) in zip(map(mul, numbers, self._counts_per_unit), self._limits, strict=True)
+        ]
+        if _BEYOND in counts:
+            for place, scale in enumerate(self._scales):
+                if counts[place] == _BEYOND:
+                    counts[place] = scale.count_beyond(numbers[place])
+                    numbers[place] = carried_by_float32(numbers[place])
         self._pack(counts, numbers)
 
     def _pack(self, counts: Sequence[int], numbers: Sequence[float]) -> None:

@@ -36,6 +36,9 @@ def smaller(left: Real, right: Real) -> Real:
 
 def clip(value: Real, low: float, high: float) -> Real:
     """Return a value within low .. high."""
+    if type(value) is float:
+        value = value if value > low else low
+        return value if value < high else high
     return smaller(larger(value, low), high)
 
 

@@ -294,22 +294,24 @@ class Simulation:
         self._was_watched = is_watched
 
     def _look(self) -> None:
+        now_s, settings = self.clock.now_s, self.around.world.settings.values
         is_watched = self.person.watched_s is not None
         if is_watched or self._was_watched:
             self._follow_person(is_watched)
-            self.lease.note_local_run(self.clock.now_s)
-        if is_serving := self.service.is_serving:
-            self.observer.note_serving(self.clock.now_s)
+            self.lease.note_local_run(now_s)
+        if self.service.is_serving:
+            self.observer.note_serving(now_s)
+        else:
+            self.reasons.note(MACHINE, now_s)
         self.around.look()
         self.around.tell_reasons(self.reasons)
-        self.zeros.note_settings(self.around.world.settings.values, self.clock.now_s)
-        if not is_serving:
-            self.reasons.note(MACHINE, self.clock.now_s)
-        self.observer.look(self.clock.now_s)
-        self.lease.look(self.clock.now_s)
-        settings = self.around.world.settings.values
+        if settings:
+            self.reasons.note_settings(settings, now_s)
+            self.zeros.note_settings(settings, now_s)
+        self.observer.look(now_s)
+        self.lease.look(now_s)
         is_whole = bool(settings) and self.observer.control_lost_s is None and self.around.is_whole
-        self.cell.look(settings, self.clock.now_s, is_whole=is_whole)
+        self.cell.look(settings, now_s, is_whole=is_whole)
         self.outside.call_later(LOOK_S, self._look)
 
     def _read_status(self) -> None:

@@ -26,9 +26,11 @@ FIRST_SETTING_S = 0.3
 
 
 class Surroundings:
-    """cell_s: between two readings of a load cell that talks by itself; cell_pace: how many times longer it takes now."""
+    """cell_s: between two readings of a load cell that talks by itself; cell_pace: how many times longer it takes now;
+    is_whole: whether every wire is, and each device at its own pace, as it was told last."""
 
     cell_pace = 1.0
+    is_whole = True
     _dark_until_s = 0.0
     _freed_s = -LOOSE_S
     _is_stuck = False
@@ -113,12 +115,6 @@ class Surroundings:
         CABLES[line].push()
         self._judge()
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether every wire is, and each device at its own pace."""
-        is_dark = self._outside.time() < self._dark_until_s + NOTICED_S
-        return self.cell_pace == 1.0 and not is_dark and not any(cable.is_disturbed for cable in CABLES.values())
-
     def pressing_n(self) -> float:
         """What the air presses with, in whichever chamber."""
         twin = self.world.twin
@@ -174,15 +170,15 @@ class Surroundings:
     def tell_reasons(self, reasons: ReasonJudge) -> None:
         """Say what is disturbed now."""
         now_s = self._outside.time()
-        if values := self.world.settings.values:
-            reasons.note_settings(values, now_s)
-        for line, cable in CABLES.items():
-            if cable.is_disturbed or line in self._pulled:
-                reasons.note(line, now_s)
+        disturbed = [line for line, cable in CABLES.items() if cable.is_disturbed(now_s)]
+        is_slow, is_dark = self.cell_pace != 1.0, now_s < self._dark_until_s + NOTICED_S
+        self.is_whole = not (disturbed or is_slow or is_dark)
+        for line in (*disturbed, *sorted(self._pulled)):
+            reasons.note(line, now_s)
         self._pulled.clear()
-        if self.cell_pace != 1.0:
+        if is_slow:
             reasons.note(CELL, now_s)
-        if now_s < self._dark_until_s + NOTICED_S:
+        if is_dark:
             reasons.note(OUTPUT, now_s)
 
     # -- their wires

@@ -66,11 +66,13 @@ class ExpectedForce:
         """Expect by another model from now on; the lagged voltage stays."""
         self._model = model
         self._rest_n = model.force_n(self._rest_v, 1.0)
+        self._standing_n = model.branch_forces_n(self._voltage_v)
         self._evaluate()
 
     def advance(self, voltage_v: float, dt_s: float) -> None:
         """Advance the model: voltage_v stood on the output for the last dt_s."""
-        self._voltage_v = voltage_v
+        if voltage_v != self._voltage_v:
+            self._voltage_v, self._standing_n = voltage_v, self._model.branch_forces_n(voltage_v)
         if dt_s > 0.0 and voltage_v != self._lagged_v:
             self._lagged_v += (voltage_v - self._lagged_v) * dt_s / (self.lag_s + dt_s)
             self._evaluate()
@@ -93,7 +95,7 @@ class ExpectedForce:
     def bounds_n(self) -> tuple[float, float]:
         """Return the least and the most cell force, N, of a machine that follows at once, by the lag or in between: a dead
         time is in the lag, behind which a machine arrives sooner than a lag of that length."""
-        rising_n, falling_n = self._model.branch_forces_n(self._voltage_v)
+        rising_n, falling_n = self._standing_n
         return min(rising_n, self.rising_n), max(falling_n, self.falling_n)
 
     @property

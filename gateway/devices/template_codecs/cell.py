@@ -170,6 +170,7 @@ class TemplateCellDevice:
         nothing = {field.name: _nothing(field) for field in self._reading.template.fields}
         self._around: dict[str, Value] = {**nothing, **profile.constants, UNIT: self._reading.unit_word(self._unit)}
         self._beside: dict[tuple[Quality, bool], tuple[dict[str, Value], bool]] = {}
+        self._known: dict[tuple[float, Quality], bytes] = {}  # as the host's: a force at rest shows the same few frames
         self._largest, self._decimals = self._reading.largest_shown, self._reading.decimals
         self._lines = self._grammar.questions()
         self._checks, self._answers = CheckSpelling(self._grammar), b""
@@ -206,6 +207,13 @@ class TemplateCellDevice:
 
     def _encode_frame(self, raw: float, quality: Quality) -> bytes:
         number = round(raw, self._decimals) if isfinite(raw) else raw
+        if (number, quality) not in self._known:
+            if len(self._known) >= _MOST_KNOWN:
+                self._known.clear()
+            self._known[number, quality] = self._spell_frame(number, quality)
+        return self._known[number, quality]
+
+    def _spell_frame(self, number: float, quality: Quality) -> bytes:
         words, has_sign = self._words_beside(quality, is_negative=number < 0.0)
         values = {**self._around, **words, FORCE: abs(number) if has_sign else number}
         if self._reading.modbus:

@@ -10,6 +10,7 @@ every quarter of an hour. So the warning comes long before the fault, and a line
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from math import ceil, inf
 from typing import Final
 
 from gateway.codes.explanation import BUSY_CURE, is_cause
@@ -39,20 +40,21 @@ class _RecentSums:
     """Sums of several amounts over the last 10 s, in bins of 1 s."""
 
     def __init__(self, amounts: int) -> None:
-        self._bins: deque[tuple[float, list[float]]] = deque()
         self._none = [0.0] * amounts
+        self._bins: deque[tuple[float, list[float]]] = deque(maxlen=ceil(WINDOW_S / _BIN_S))
+        self._begun_s, self._sums = -inf, self._none
 
     def add(self, now_s: float, *amounts: float) -> None:
-        if not self._bins or now_s - self._bins[-1][0] >= _BIN_S:
-            self._bins.append((now_s, self._none.copy()))
-        while now_s - self._bins[0][0] >= WINDOW_S:
-            self._bins.popleft()
-        sums = self._bins[-1][1]
+        if now_s - self._begun_s >= _BIN_S:
+            self._begun_s, self._sums = now_s, self._none.copy()
+            self._bins.append((now_s, self._sums))
+        sums = self._sums
         for k, amount in enumerate(amounts):
             sums[k] += amount
 
-    def totals(self) -> list[float]:
-        return [sum(column) for column in zip(*(sums for _, sums in self._bins), strict=True)]
+    def totals(self, now_s: float) -> list[float]:
+        recent = (sums for begun_s, sums in self._bins if now_s - begun_s < WINDOW_S)
+        return [sum(column) for column in zip(*recent, strict=True)]
 
 
 class _RateWarning:
@@ -87,12 +89,13 @@ class LineNoise(_RateWarning):
         what our loop gave up as overdue, and comes then, is read from its middle on; empty where nobody was.
         """
         dropped = [one.data for one in messages if isinstance(one, Garbage)]
-        if messages:
-            self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         if not dropped:
+            if messages:
+                self._recent.add(now_s, 0, len(messages))
             return ""
+        self._recent.add(now_s, len(dropped), len(messages), sum(map(len, dropped)))
         self._last_s = now_s
-        count, total, size = self._recent.totals()
+        count, total, size = self._recent.totals(now_s)
         if self.is_on or count < LEAST or count <= SHARE * total:
             return ""
         self.is_on = True
@@ -129,7 +132,7 @@ class SlowLoop(_RateWarning):
         behind_s, used = (expirations - 1) * self._period_s + late_s, processor_time()
         waited_s, ran_s = (used.waited_s, used.on_cpu_s) if used else (0.0, 0.0)
         self._recent.add(now_s, bad, expirations, 1, behind_s, min(waited_s, behind_s), min(ran_s, behind_s))
-        missed, ticks, stalls, *spent_s = self._recent.totals()
+        missed, ticks, stalls, *spent_s = self._recent.totals(now_s)
         if self.is_on or stalls < LEAST or missed <= SHARE * WINDOW_S / self._period_s:
             return ""
         self.is_on = True

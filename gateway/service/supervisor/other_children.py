@@ -33,6 +33,7 @@ class OtherChildren:
         self._starter, self._log, self._tell = starter, log, tell
         self._rig: RigSupervisor | None = None
         self._optional: dict[str, OptionalChildSupervisor] = {}
+        self._all: list[ChildStarter | RigSupervisor | OptionalChildSupervisor] = [starter]
 
     @property
     def sources(self) -> list[int]:
@@ -63,6 +64,7 @@ class OtherChildren:
         if self._rig is None:
             starter = self._starter
             self._rig = RigSupervisor(lambda first: starter.rig(prepared=first), self._tell, partial(self._log, "rig"))
+            self._all.append(self._rig)
         self._rig.ask(now_s)
 
     def provide_optional(self, name: str, arguments: dict[str, Any], now_s: float) -> None:
@@ -70,6 +72,7 @@ class OtherChildren:
         if name not in self._optional:
             spawn = partial(self._starter.optional, name, arguments)
             self._optional[name] = OptionalChildSupervisor(_WORDS[name], spawn, partial(self._log, name))
+            self._all.append(self._optional[name])
         self._optional[name].start(now_s)
 
     def end(self) -> None:
@@ -81,7 +84,3 @@ class OtherChildren:
     @property
     def _watched(self) -> list[ChildStarter | RigSupervisor | OptionalChildSupervisor]:
         return [one for one in self._all if one is self._rig] if self.is_stopping else self._all
-
-    @property
-    def _all(self) -> list[ChildStarter | RigSupervisor | OptionalChildSupervisor]:
-        return [one for one in (self._starter, self._rig, *self._optional.values()) if one]

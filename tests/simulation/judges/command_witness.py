@@ -4,6 +4,7 @@ whether a zero was taken as often as somebody has asked for it (I8). No code of 
 
 import struct
 from collections import deque
+from itertools import chain
 from math import isnan, nan
 
 from tests.simulation.judges.observer import Observer
@@ -45,8 +46,8 @@ class CommandWitness:
         self._known = words
 
     def _is_written(self, place: int, word: int) -> bool:
-        """A setpoint may be lowered, by a calibration that allows less."""
-        found = (*(_word_of(pdu, place) for _, pdu in self._written), self._known[place])
+        """A setpoint may be lowered, by a calibration that allows less. What was written last is most often it."""
+        found = chain((self._known[place],), (_word_of(pdu, place) for _, pdu in reversed(self._written)))
         return any(one == word or isnan(one) or (place == SETPOINT and word < one) for one in found if one is not None)
 
 

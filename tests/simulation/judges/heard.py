@@ -5,6 +5,7 @@ Shares no code with the gateway, as the observer does not.
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from struct import unpack_from
 
 from tests.simulation.judges.observer import Observer
@@ -33,6 +34,7 @@ RTU_OUTPUT = "waveshare-ao8b"
 OUTPUTS = (*SENTENCES, RTU_OUTPUT)
 
 
+@lru_cache(1024)
 def crc16(data: bytes) -> int:
     """Of Modbus RTU."""
     crc = 0xFFFF

@@ -135,14 +135,12 @@ class Observer:
         found = SENTENCE.search(line)
         if found:
             self.cell_said_s = now_s
-        self.history.readings.append((now_s, _force_n(found) if found and found[1] != b"OL" else None))
-        self._over = self._over + 1 if found and self._is_over(found) else 0
+        is_beyond = found is not None and found[1] == b"OL"
+        force_n = _force_n(found) if found and not is_beyond else None
+        self.history.readings.append((now_s, force_n))
+        is_over = is_beyond or (force_n is not None and abs(force_n) >= self.bounds.over_force_n + ZERO_N)
+        self._over = self._over + 1 if is_over else 0
         self.over_s = (self.over_s or now_s) if self._over >= OVER_READINGS else None
-
-    def _is_over(self, found: re.Match[bytes]) -> bool:
-        if found[1] == b"OL":
-            return True
-        return abs(_force_n(found)) >= self.bounds.over_force_n + ZERO_N
 
     def note_cut(self, until_s: float) -> None:
         """The sender was cut off, or the plug pulled: half a sentence may stand before the next, and the first that is begun

@@ -125,7 +125,7 @@ class StatusWitness:
         at_s, beat = self._echoes.popleft()
         while self._beats and self._beats[0][0] < at_s - BEATEN_S:
             self._beats.popleft()
-        if beat not in (0, self._beat) and not any(one == beat or one != one for _, one in self._beats):
+        if beat not in (0, self._beat) and not any(one == beat or one != one for _, one in reversed(self._beats)):
             self._observer.complain("I7", f"heartbeat {beat} is used, which nobody has written", at_s)
         self._beat = beat
 
@@ -139,10 +139,8 @@ class StatusWitness:
         self._requested_s = at_s
         signed = counts - 65536 if counts & UNAVAILABLE else counts
         left, former = self._left
-        is_taken_over = owner != former and counts == left
-        is_written = any(not abs(signed - one) > 1.0 for _, one in self._written)
-        is_known = counts in (0, self._known) or is_written or is_taken_over
-        if not is_known:
+        is_known = counts in (0, self._known) or (owner != former and counts == left)
+        if not is_known and all(abs(signed - one) > 1.0 for _, one in self._written):
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
         self._known, self._left = counts, (accepted, owner)
 
@@ -182,11 +180,14 @@ class StatusWitness:
             return
         heard_s, period_s = self._heard_s(), self._observer.bounds.period_s
         silent_s, awoken = at_s - heard_s, self._observer.history.awoken
+        younger_s = silent_s - AGE_SLACK_S - 2.0 * period_s - age_ms * 1e-3
+        if younger_s <= 0.0 or age_ms >= LONGEST_MS:
+            return
         waits = sum(
             any(begin_s < one_s <= end_s for one_s in awoken)
             for begin_s, end_s in ((heard_s, heard_s + WAITED_S), (at_s - 2.0 * period_s, at_s))
         )
-        if age_ms < LONGEST_MS and age_ms * 1e-3 < silent_s - AGE_SLACK_S - 2.0 * period_s - WAITED_S * waits:
+        if younger_s > WAITED_S * waits:
             self._observer.complain("I10", f"a sample of {age_ms} ms, after {silent_s:.3f} s of silence", at_s)
 
     def _judge_voltage(self, asked_mv: int, at_s: float) -> None:

@@ -94,10 +94,9 @@ class Cable:
         """When its host has heard last what the device has not said, or not so."""
         return max(self.strange_s, self.spoiled_s)
 
-    @property
-    def is_disturbed(self) -> bool:
+    def is_disturbed(self, now_s: float) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
-        strange_since_s = self._outside.time() - STRANGE_S
+        strange_since_s = now_s - STRANGE_S
         return (
             self.strange_s > strange_since_s
             or self.spoiled_s > strange_since_s
@@ -152,8 +151,10 @@ class Cable:
 
     def _put(self, direction: Direction, data: bytes, take: Callable[[Direction, bytes], None]) -> None:
         now_s = self._outside.time()
-        begin_s = max(now_s, direction.through_s)
-        data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
+        begin_s = direction.through_s if direction.through_s > now_s else now_s
+        room = MOST_QUEUED - int((begin_s - now_s) / self._character_s)
+        if len(data) > room:
+            data = data[: max(0, room)]
         if data and self.adapter_s and direction is self._to_host:
             self._put_in_pieces(direction, data, begin_s)
         elif data:

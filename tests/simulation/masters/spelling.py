@@ -6,10 +6,13 @@ A way gives the requests that begin a command, in their order, and the one that 
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import isfinite, nan
 from typing import NamedTuple
 
 WRITES = frozenset((5, 6, 15, 16, 22, 23))
+WORDS = {6: slice(3, 5), 16: slice(6, None), 23: slice(10, None)}
+"""Where a request that writes words has them, by its function."""
 ENABLE = 1
 DISABLED_BY_BIT, BITS = -2, -1
 """Stand for a control word that nobody can tell from the request: of enable only it is known that it is cleared, or nothing."""
@@ -112,18 +115,28 @@ WAYS: dict[str, Way] = {
 }
 
 
+once_each = lru_cache(4096)
+"""Of what several judges ask of one and the same request."""
+
+
 def written_address(pdu: bytes) -> int:
     """The first address that a write changes."""
     return int.from_bytes(pdu[5:7] if pdu[0] == 23 else pdu[1:3])
 
 
+def written_words(pdu: bytes) -> bytes:
+    """The words that a write carries, nothing of another request."""
+    return pdu[WORDS[pdu[0]]] if pdu[0] in WORDS else b""
+
+
 MODE, BEAT = 3, 4
 
 
+@once_each
 def word_of(pdu: bytes, place: int) -> float | None:
     """What a write would set this word of the command to; None where it is not among what it writes, not a number where nobody
     can tell."""
-    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}.get(pdu[0], b"")
+    data = written_words(pdu)
     address = written_address(pdu)
     if pdu[0] == 22:
         return nan if address == place or address >= 200 else None
@@ -142,7 +155,7 @@ def setpoints_of(pdu: bytes) -> tuple[float, ...]:
     """What a write would set force_setpoint to, in its counts; not a number where that cannot be told from the request."""
     if pdu[0] == 22 and pdu[1:3] == b"\x00\x01":
         return (nan,)
-    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}.get(pdu[0], b"")
+    data = written_words(pdu)
     address = written_address(pdu)
     if data and address <= 1 and len(data) >= 2 * (2 - address):
         return struct.unpack_from(">h", data, 2 * (1 - address))
@@ -176,11 +189,12 @@ def takes_set(pdu: bytes) -> bool:
 
 def _told_at(places: tuple[tuple[int, int], ...], pdu: bytes) -> Iterator[bytes]:
     """What a write tells of each of these places, and how it is masked; nothing of those that it leaves alone."""
-    data = {6: pdu[3:5], 16: pdu[6:], 22: pdu[3:7], 23: pdu[10:]}.get(pdu[0], b"")
-    at = [(2 * (first - written_address(pdu)), 2 * count) for first, count in places] if data else []
-    return (data[begin : begin + count] for begin, count in at if begin >= 0)
+    data, address = pdu[3:7] if pdu[0] == 22 else written_words(pdu), written_address(pdu)
+    at = [(2 * (first - address), 2 * count) for first, count in places if first >= address] if data else []
+    return (data[begin : begin + count] for begin, count in at)
 
 
+@once_each
 def control_of(pdu: bytes) -> int | None:
     """The control word that a write would set, None where it is not among what it writes; BITS where it changes single bits,
     DISABLED_BY_BIT where enable is cleared among them."""
@@ -189,7 +203,7 @@ def control_of(pdu: bytes) -> int | None:
     address = struct.unpack_from(">H", pdu, 5 if pdu[0] == 23 else 1)[0]
     if pdu[0] in (5, 15, 22):
         return None if address >= 16 or (pdu[0] == 22 and address) else _bits_of(pdu, address)
-    data = {6: pdu[3:5], 16: pdu[6:], 23: pdu[10:]}[pdu[0]]
+    data = written_words(pdu)
     if address in (200, 300) and len(data) >= 4:
         number = struct.unpack(">f", data[:4] if address == 200 else data[2:4] + data[:2])[0]
         return int(number) if isfinite(number) and 0 <= number < 65536 else BITS

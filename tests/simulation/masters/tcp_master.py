@@ -6,7 +6,7 @@ They spell frames themselves. Each checks its own answers: the right transaction
 import struct
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from tests.simulation.kernel.network import Caller, Line
 from tests.simulation.kernel.virtual_time import VirtualLoop
@@ -42,8 +42,7 @@ RESET_S = 0.3
 """Until what a reset has changed is seen: some ticks."""
 
 
-@dataclass(frozen=True)
-class Asked:
+class Asked(NamedTuple):
     """A request that waits for its answer. control: the control word that it writes, None for none."""
 
     transaction: int
