@@ -29,9 +29,9 @@ _VERSION, _EXTENSIONS = 0xA0, 0xA3
 
 
 class PeerCertificate(NamedTuple):
-    """name: the subject's common name; role: what the extension says, empty where it is not one UTF8String,
-    None without one; serial: in hex, as `openssl x509 -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the
-    times do; subject, issuer: the whole names as the bytes stand there, to see which of several has signed which."""
+    """name: the subject's common name; role: what the extension says, empty where that is not one UTF8String, None without
+    one; serial: in hex, as `openssl x509 -serial` has it; begins, ends: UTC as YYYYMMDDHHMMSSZ, which sort as the times do;
+    subject, issuer: the whole names as the bytes stand there, to see which of several has signed which."""
 
     name: str
     role: str | None
