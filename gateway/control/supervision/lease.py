@@ -9,11 +9,9 @@ next one.
 """
 
 from math import inf, nan
-from typing import Final
 
 from gateway.registers.command import NO_CHANNEL, Channel
-
-_MOST_MASTERS: Final = 64  # whose last heartbeats are known, and as many frames'
+from gateway.registers.writes.ownership import keep_latest
 
 
 class Lease:
@@ -38,14 +36,9 @@ class Lease:
         if self._is_beat(heartbeat, who, channel):
             self._changed_s, self._master = now_s, who
             self._unbeaten.pop(who, None)
-            self._beats.pop(who, None)  # whoever beats last stays longest
-            self._beats[who] = heartbeat, now_s
-            if len(self._beats) > _MOST_MASTERS:
-                del self._beats[next(iter(self._beats))]
+            keep_latest(self._beats, who, (heartbeat, now_s))
         self._heartbeat = heartbeat
-        self._brought[channel] = heartbeat
-        if len(self._brought) > _MOST_MASTERS:
-            del self._brought[next(iter(self._brought))]
+        keep_latest(self._brought, channel, heartbeat)
 
     def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
         is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
@@ -60,9 +53,7 @@ class Lease:
         if self.would_start_for(who):
             self.start(now_s, who)
         self._master = who
-        self._unbeaten[who] = None
-        if len(self._unbeaten) > _MOST_MASTERS:
-            del self._unbeaten[next(iter(self._unbeaten))]
+        keep_latest(self._unbeaten, who, None)
 
     def stop(self, now_s: float, who: str) -> None:
         """Let no beat of before count of any other master that has beaten within one length: this one has switched the output

@@ -13,10 +13,10 @@ from gateway.registers.map.register_map import Register
 from gateway.registers.refusal import Refusal
 from gateway.registers.values import WordOrder, pack_number, unpack_number
 from gateway.registers.writes.command_block import check_zeros
+from gateway.registers.writes.ownership import keep_latest
 
 PROOF: Final = 1234.5
 _ORDERS: Final = {pack_number("float32", order, PROOF): order for order in WordOrder}
-_MOST_HOSTS: Final = 64  # memory stays bounded whoever writes
 
 
 class ByteOrderEcho:
@@ -46,14 +46,8 @@ class ByteOrderEcho:
         if (order := _ORDERS.get(echo)) is None:
             raise self._refusal(float(unpack_number("float32", WordOrder.ABCD, echo)))
         self._image.write(self._register.address, echo)
-        self._remember(host)
+        keep_latest(self._proven, host, None)
         return order
-
-    def _remember(self, host: str) -> None:
-        self._proven.pop(host, None)
-        self._proven[host] = None
-        if len(self._proven) > _MOST_HOSTS:
-            del self._proven[next(iter(self._proven))]
 
     def _refusal(self, value: float) -> Refusal:
         is_number = value == value and abs(value) != float("inf")

@@ -7,23 +7,14 @@ on with the same heartbeat would begin when that reason is over.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Final, NamedTuple, TypeVar
+from typing import Final, NamedTuple
 
-_Kept = TypeVar("_Kept")
+from gateway.registers.writes.ownership import keep_latest
 
-_MOST_HOLDERS: Final = 64  # memory stays bounded whoever writes
 _CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
 _TOLD_S: Final = 1.0  # from one time that the next process is told to another
 _DOWN_S: Final = 10.0  # that a start may take, in which nobody can write
-
-
-def _keep_latest(by_host: dict[str, _Kept], host: str, kept: _Kept) -> None:
-    """Put a host behind all others, and forget whoever has not been heard for longest where there are too many."""
-    by_host.pop(host, None)
-    by_host[host] = kept
-    if len(by_host) > _MOST_HOLDERS:
-        del by_host[next(iter(by_host))]
 
 
 class HeldRuns:
@@ -41,7 +32,7 @@ class HeldRuns:
         """Note which bits a host keeps at 1."""
         before = self.by_host.pop(host, 0)
         if held:
-            _keep_latest(self.by_host, host, held)
+            keep_latest(self.by_host, host, held)
         if held != before:
             self.on_change(dict(self.by_host))
 
@@ -89,7 +80,7 @@ class LastTares:
     def note(self, host: str, heartbeat: int, now_s: float) -> None:
         """Note a tare, and the heartbeat that came with it, or else stood."""
         if self._has_lease:
-            _keep_latest(self._last, host, (heartbeat, now_s))
+            keep_latest(self._last, host, (heartbeat, now_s))
 
     def repeats(self, host: str, heartbeat: int | None, now_s: float) -> bool:
         """Decide whether this host has brought this heartbeat with its last tare; None: one that brings none comes as often as
@@ -131,7 +122,7 @@ class HeldEnables:
     def note(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
         is_new = host not in self.by_host
-        _keep_latest(self.by_host, host, now_s)
+        keep_latest(self.by_host, host, now_s)
         if is_new or now_s - self._told_s >= _TOLD_S:
             self._told_s = now_s
             self.on_change(dict(self.by_host))
@@ -141,7 +132,7 @@ class HeldEnables:
         on, the next process would press."""
         if host is None or not self._has_lease or self._lost_now.get(host) == heartbeat:
             return
-        _keep_latest(self._lost_now, host, heartbeat)
+        keep_latest(self._lost_now, host, heartbeat)
         self.on_lost(dict(self._lost_now))
 
     def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:
@@ -154,7 +145,7 @@ class HeldEnables:
             self.note_lost(host, before.heartbeat)
         beats = frame.heartbeat is not None
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
-        _keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s))
+        keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s))
 
     def note_refused_beat(self, host: str, heartbeat: int) -> None:
         """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""

@@ -9,7 +9,7 @@ face are one host, for a bus has no addresses of masters.
 
 from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv6Address, ip_address
-from typing import Final
+from typing import Final, TypeVar
 
 from gateway.modbus.peer import NOBODY, Peer
 
@@ -18,7 +18,20 @@ NOT_IPV4: Final = 0xFFFFFFFF
 LARGEST_SERIAL_PLACE: Final = 255
 """Serial faces are shown in owner_ip as 1 to 255: 0.0.0.0/8 holds no address of a host (RFC 1122, 3.2.1.3)."""
 
+MOST_KNOWN: Final = 64
+"""Masters that anything is known of: memory stays bounded whoever writes."""
+
 _SERIAL: Final = "serial:"
+_Key = TypeVar("_Key")
+_Kept = TypeVar("_Kept")
+
+
+def keep_latest(known: dict[_Key, _Kept], key: _Key, kept: _Kept) -> None:
+    """Put a master behind all others, and forget whoever has not been heard for longest where there are too many."""
+    known.pop(key, None)
+    known[key] = kept
+    if len(known) > MOST_KNOWN:
+        del known[next(iter(known))]
 
 
 def serial_host(place: int) -> str:
