@@ -14,6 +14,7 @@ _NO_BIT: Final = ControlBit(0)
 Channel: TypeAlias = tuple[str, int, int, int]
 """Host, port, address and bytes of a write: a master that writes in cycles has one for each of its frames."""
 NO_CHANNEL: Final = ("", 0, 0, 0)
+_MOST_FRAMES: Final = 64  # memory stays bounded whoever writes
 
 
 class Command(NamedTuple):
@@ -84,3 +85,22 @@ class Status(NamedTuple):
     calibration_time_left_s: float = 0.0
     residual_cause: int = 0  # ResidualCause
     plant_id: int = 0
+
+
+class FrameBeats:
+    """The last heartbeat of each frame: of a program that stands still none changes, whatever its other frames bring."""
+
+    def __init__(self) -> None:
+        self._last: dict[Channel, int] = {}
+
+    def has_brought(self, channel: Channel, heartbeat: int) -> bool:
+        """Decide whether this is what the frame has brought last."""
+        return self._last.get(channel) == heartbeat
+
+    def note(self, channel: Channel, heartbeat: int) -> bool:
+        """Note what a frame brings; return whether that is another heartbeat than before, or its first."""
+        is_new = self._last.pop(channel, None) != heartbeat
+        self._last[channel] = heartbeat
+        if len(self._last) > _MOST_FRAMES:
+            del self._last[next(iter(self._last))]
+        return is_new

@@ -11,9 +11,9 @@ next one.
 from math import inf, nan
 from typing import Final
 
-from gateway.registers.command import NO_CHANNEL, Channel
+from gateway.registers.command import NO_CHANNEL, Channel, FrameBeats
 
-_MOST_MASTERS: Final = 64  # whose last heartbeats are known, and as many frames'
+_MOST_MASTERS: Final = 64  # whose last heartbeats are known
 
 
 class Lease:
@@ -25,7 +25,7 @@ class Lease:
         self._changed_s = -inf
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
-        self._brought: dict[Channel, int] = {}  # of each frame its last
+        self._frames = FrameBeats()
         self._master = ""  # who has the lease
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
 
@@ -42,13 +42,11 @@ class Lease:
             if len(self._beats) > _MOST_MASTERS:
                 del self._beats[next(iter(self._beats))]
         self._heartbeat = heartbeat
-        self._brought[channel] = heartbeat
-        if len(self._brought) > _MOST_MASTERS:
-            del self._brought[next(iter(self._brought))]
+        self._frames.note(channel, heartbeat)
 
     def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
         is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
-        return is_new and self._brought.get(channel) != heartbeat
+        return is_new and not self._frames.has_brought(channel, heartbeat)
 
     def start(self, now_s: float, who: str = "") -> None:
         """Start the lease at an enable: the master has one length to beat."""
