@@ -6,6 +6,7 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
+from gateway.registers.command import NO_CHANNEL
 from gateway.registers.rig_rules import BASIC_BITS
 from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.held_starts import HeldEnables, HeldRuns
@@ -287,7 +288,7 @@ def test_a_master_is_lost_once_with_each_heartbeat_and_found_by_another_one() ->
     for heartbeat, times in ((3, 1), (3, 1), (4, 2)):
         held.note_lost("a", heartbeat)
         assert len(told) == times
-    held.hear("a", 4)
+    held.hear("a", 4, NO_CHANNEL)
     assert held.knows("a"), "by its last frame, sent on and on"
-    held.hear("a", 5)
+    held.hear("a", 5, NO_CHANNEL)
     assert told == [{"a": 3}, {"a": 4}, {}] and not held.knows("a")

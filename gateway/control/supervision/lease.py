@@ -11,7 +11,7 @@ next one.
 from math import inf, nan
 
 from gateway.registers.command import NO_CHANNEL, Channel
-from gateway.registers.writes.ownership import keep_latest
+from gateway.registers.writes.ownership import FrameBeats, keep_latest
 
 
 class Lease:
@@ -23,7 +23,7 @@ class Lease:
         self._changed_s = -inf
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
-        self._brought: dict[Channel, int] = {}  # of each frame its last
+        self._frames = FrameBeats()
         self._master = ""  # who has the lease
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
 
@@ -38,11 +38,11 @@ class Lease:
             self._unbeaten.pop(who, None)
             keep_latest(self._beats, who, (heartbeat, now_s))
         self._heartbeat = heartbeat
-        keep_latest(self._brought, channel, heartbeat)
+        self._frames.note(channel, heartbeat)
 
     def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
         is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
-        return is_new and self._brought.get(channel) != heartbeat
+        return is_new and not self._frames.has_brought(channel, heartbeat)
 
     def start(self, now_s: float, who: str = "") -> None:
         """Start the lease at an enable: the master has one length to beat."""

@@ -240,7 +240,7 @@ class Admission:
 
     def _frame(self, write: Write, values: Values, word: int) -> StartFrame:
         beat = int(values[HEARTBEAT]) if HEARTBEAT in self._offsets(write) else None
-        return StartFrame((write.address, write.data), beat, bool(word & TAKE))
+        return StartFrame(write.sender[1], (write.address, write.data), beat, bool(word & TAKE))
 
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
@@ -248,7 +248,7 @@ class Admission:
         if reason is RefusalReason.BYTE_ORDER_UNPROVEN or write.host in self.held_runs.by_host:
             return  # its own proof, its own 0 are waited for
         offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])
-        frame, asks = StartFrame((write.address, write.data)), CONTROL_WORD in offsets
+        frame, asks = StartFrame(write.sender[1], (write.address, write.data)), CONTROL_WORD in offsets
         with suppress(Refusal):
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
@@ -258,7 +258,7 @@ class Admission:
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
-            self.held_enables.note_refused_beat(write.host, frame.heartbeat)
+            self.held_enables.note_refused_beat(write.host, frame)
 
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
@@ -266,7 +266,7 @@ class Admission:
         for held, bit in ((self.held_enables, ControlBit.ENABLE), (self._last_tares, ControlBit.TARE)):
             offsets = self._offsets(write) if held.knows(write.host) else ()
             if HEARTBEAT in offsets:
-                held.hear(write.host, heartbeat)
+                held.hear(write.host, heartbeat, write.sender[1])
             if CONTROL_WORD in offsets and write.touched & ~asked & bit:
                 held.let_go(write.host)
 

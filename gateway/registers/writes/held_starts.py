@@ -3,13 +3,14 @@
 They outlive the process: by a control that was started anew the holder's next cycle would begin another run, or press over a
 fault that was latched, and that nobody has reset. An enable that is written on and on over a latched fault would press by
 another master's reset alone, too: a reset begins nothing. And a start that was refused, for whatever reason, and comes on and
-on with the same heartbeat would begin when that reason is over.
+on with the same heartbeat would begin when that reason is over, whatever its other frames bring, as long as they stand still.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
-from gateway.registers.writes.ownership import keep_latest
+from gateway.registers.command import Channel
+from gateway.registers.writes.ownership import FrameBeats, keep_latest
 
 _CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
@@ -44,6 +45,7 @@ class HeldRuns:
 class StartFrame(NamedTuple):
     """A write, by what tells it from the one before. heartbeat: None where it brings none; takes: it takes over."""
 
+    channel: Channel
     data: tuple[int, bytes]  # where, and what
     heartbeat: int | None = None
     takes: bool = False
@@ -74,7 +76,7 @@ class LastTares:
     heartbeat since, or the bit as 0, goes on. has_lease: a heartbeat has to change; else none is noted."""
 
     def __init__(self, *, has_lease: bool = True) -> None:
-        self._has_lease = has_lease
+        self._has_lease, self._frames = has_lease, FrameBeats()
         self._last: dict[str, tuple[int, float]] = {}
 
     def note(self, host: str, heartbeat: int, now_s: float) -> None:
@@ -94,9 +96,9 @@ class LastTares:
         """Decide whether this host has tared, and has not gone on since."""
         return host in self._last
 
-    def hear(self, host: str, heartbeat: int) -> None:
+    def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note a heartbeat of a host."""
-        if self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
+        if self._frames.note(channel, heartbeat) and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
             self.let_go(host)
 
     def let_go(self, host: str) -> None:
@@ -116,6 +118,7 @@ class HeldEnables:
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, int] = {}
         self._lost_now: dict[str, int] = {}
+        self._frames = FrameBeats()
         self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
 
@@ -141,14 +144,26 @@ class HeldEnables:
         if not self._has_lease:
             return
         before = self._refused.pop(host, None)
-        if before and before.is_same(frame) and before.beats:
-            self.note_lost(host, before.heartbeat)
+        if before and self._is_same(before, frame):
+            frame = frame._replace(takes=frame.takes or before.frame.takes)  # one of its frames does
+            if before.beats:
+                self.note_lost(host, before.heartbeat)
         beats = frame.heartbeat is not None
+        if frame.heartbeat is not None:
+            self._frames.note(frame.channel, frame.heartbeat)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
         keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s))
 
-    def note_refused_beat(self, host: str, heartbeat: int) -> None:
+    def _is_same(self, refused: _Refused, frame: StartFrame) -> bool:
+        """Whether a frame brings nothing new, beside what was refused last or behind itself."""
+        is_as_before = frame.heartbeat is not None and self._frames.has_brought(frame.channel, frame.heartbeat)
+        return refused.is_same(frame) or (is_as_before and (refused.frame.takes or not frame.takes))
+
+    def note_refused_beat(self, host: str, frame: StartFrame) -> None:
         """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""
+        heartbeat = frame.heartbeat
+        if heartbeat is None or not self._frames.note(frame.channel, heartbeat):
+            return
         if refused := self._refused.get(host):
             self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
 
@@ -158,7 +173,7 @@ class HeldEnables:
         is over."""
         if host in self.lost and frame.heartbeat in (None, self.lost[host]):
             return True
-        if (refused := self._refused.get(host)) is None or not refused.is_same(frame):
+        if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
             return False
         if now_s - refused.at_s >= _HELD_S:
             del self._refused[host]
@@ -180,14 +195,17 @@ class HeldEnables:
         self.note(host, now_s)
         return True
 
-    def hear(self, host: str, heartbeat: int) -> None:
+    def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
-        if self._lost_now.get(host, heartbeat) != heartbeat:
+        is_new = self._frames.note(channel, heartbeat)
+        if is_new and self._lost_now.get(host, heartbeat) != heartbeat:
             self._find(host)
-        if (refused := self._refused.get(host)) is not None:
+        if (refused := self._refused.get(host)) is None:
+            return
+        if refused.heartbeat == heartbeat:
+            self._refused[host] = refused._replace(beats=True)
+        elif is_new:
             del self._refused[host]
-            if refused.heartbeat == heartbeat:
-                self._refused[host] = refused._replace(beats=True)
 
     def let_go(self, host: str) -> None:
         """Note that a host has written enable as 0."""

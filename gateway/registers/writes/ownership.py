@@ -12,6 +12,7 @@ from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final, TypeVar
 
 from gateway.modbus.peer import NOBODY, Peer
+from gateway.registers.command import Channel
 
 NOT_IPV4: Final = 0xFFFFFFFF
 """Shown in owner_ip for an owner without an IPv4 address (IPv6)."""
@@ -91,6 +92,23 @@ class Ownership:
         self.is_explicit = False
         self.former = self.owner or self.former
         self.owner = self._configured
+
+
+class FrameBeats:
+    """The last heartbeat of each frame: of a program that stands still none changes, whatever its other frames bring."""
+
+    def __init__(self) -> None:
+        self._last: dict[Channel, int] = {}
+
+    def has_brought(self, channel: Channel, heartbeat: int) -> bool:
+        """Decide whether this is what the frame has brought last."""
+        return self._last.get(channel) == heartbeat
+
+    def note(self, channel: Channel, heartbeat: int) -> bool:
+        """Note what a frame brings; return whether that is another heartbeat than before, or its first."""
+        is_new = not self.has_brought(channel, heartbeat)
+        keep_latest(self._last, channel, heartbeat)
+        return is_new
 
 
 class LastWriters:

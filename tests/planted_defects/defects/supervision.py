@@ -50,7 +50,7 @@ DEFECTS = (
            " and (who not in self._beats or heartbeat != self._beats[who][0])", "",
            ("control/supervision/test_lease.py",)),
     Defect("two frames that stand still beat in turn", "control/supervision/lease.py",
-           "return is_new and self._brought.get(channel) != heartbeat", "return is_new",
+           "return is_new and not self._frames.has_brought(channel, heartbeat)", "return is_new",
            ("service/running_rig/masters/test_frames_side_by_side.py",)),
     Defect("a repeated write is of the connection before", "registers/writes/repeated_write.py",
            "        values[_AT_CHANNEL] = peer.host, peer.port, self._commands.first, len(data)\n", "",

@@ -11,7 +11,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE, REFUSED_SHARE = 0.24, 0.03, 0.15
+SHARE, CROWD_SHARE, REFUSED_SHARE, FRAMES_SHARE = 0.24, 0.03, 0.15, 0.1
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),
@@ -110,6 +110,16 @@ def draw_refused(seed: int) -> Iterator[Event]:
         yield Event(round(at_s, 4), whom, "hang")
     at_s += chance.choice((0.2, 0.6, 2.0)) * chance.uniform(0.5, 1.5)
     yield replace(ends, at_s=round(at_s, 4))
+
+
+def draw_frames(seed: int) -> Iterator[Event]:
+    """A program hangs that has two frames, each of which brings another heartbeat, on and on."""
+    chance = Random(f"frames {seed}")
+    if chance.random() > FRAMES_SHARE:
+        return
+    whom, at_s = chance.choice(("worker", "rival")), chance.uniform(0.5, 15.0)
+    yield _command(chance, round(at_s, 4), whom)
+    yield Event(round(at_s + chance.uniform(0.05, 4.0), 4), whom, "hang", (float(chance.randrange(20000, 60000)),))
 
 
 def _stop(chance: Random, at_s: float) -> Iterator[Event]:

@@ -14,6 +14,14 @@ ON_WIRE_S = 0.04
 """20 ms, and two sentences at 9600 baud."""
 
 
+Frame = tuple[str, int, int, int]
+
+
+def frame_of(host: str, pdu: bytes) -> Frame:
+    """What a master that writes in cycles has one of for each of its frames."""
+    return host, pdu[0], written_address(pdu), len(pdu)
+
+
 class LeaseJudge:
     """Told of each write of a master: in its order, before the observer is."""
 
@@ -24,8 +32,10 @@ class LeaseJudge:
         self._is_enabled = False
         """Whether the last write of the control word has enabled; not where that cannot be told from its bits."""
         self._renewed_s = -inf
-        self._brought: dict[tuple[str, int, int, int], float] = {}
+        self._brought: dict[Frame, float] = {}
         """Of each master's frames the last heartbeat."""
+        self._shown: dict[Frame, float] = {}
+        """The same, of those that were refused, too."""
         self._took: set[str] = set()
         """Who has taken over, and has not beaten since."""
         self._refused: dict[str, tuple[bytes, float]] = {}
@@ -39,7 +49,7 @@ class LeaseJudge:
         begins = control is not None and (
             control < 0 or control & RUN_BITS or was_off or (takes and host not in self._took)
         )
-        frame = host, pdu[0], written_address(pdu), len(pdu)
+        frame = frame_of(host, pdu)
         beats = beat is not None and (isnan(beat) or beat not in (self._beat, self._brought.get(frame)))
         if begins or not is_answered or beats:
             self._renewed_s = max(self._renewed_s, now_s)
@@ -53,8 +63,13 @@ class LeaseJudge:
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
 
     def note_start(self, pdu: bytes, now_s: float, *, is_taken: bool, host: str) -> None:
-        """A start was answered: told before `note_write`. One that was refused may begin nothing while it stays as it was."""
-        control, beat = control_of(pdu), word_of(pdu, BEAT)
+        """A request was answered: told before `note_write`. A start that was refused may begin nothing while it stays as it
+        was, and none of its master's other frames has brought another heartbeat."""
+        control, beat, frame = control_of(pdu), word_of(pdu, BEAT), frame_of(host, pdu)
+        if beat is not None and self._shown.get(frame) != beat:
+            self._shown[frame] = beat
+            if self._refused.get(host, (pdu, 0.0))[0] != pdu:
+                del self._refused[host]
         if control is None or control <= 0 or not control & (ENABLE | RUN_BITS) or beat is None:
             return
         refused, refused_s = self._refused.pop(host, (b"", -inf))
@@ -70,6 +85,7 @@ class LeaseJudge:
         """Another process does not know what was refused once, nor what each frame brought."""
         self._refused.clear()
         self._brought.clear()
+        self._shown.clear()
 
     def note_local_run(self, now_s: float) -> None:
         """A run that a person watches at the machine needs no master."""

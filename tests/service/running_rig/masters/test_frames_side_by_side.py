@@ -5,10 +5,11 @@ from struct import pack
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.words import State
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import ENABLE, OWNER, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, TARE, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.05
 FIRST, SECOND = 139, 9
@@ -44,3 +45,38 @@ def test_two_frames_of_one_master_keep_a_force_up_only_where_one_of_them_changes
                 frame(rig, beat + cycle % 2 if counts else beat)
             rig.run(CYCLE_S)
     assert rig.state is (State.HOLDING if counts else State.FAULT)
+
+
+@pytest.mark.parametrize("takes", [0, TAKE])
+@pytest.mark.parametrize("why", ["a silent cell", "another owner"])
+def test_what_was_refused_begins_not_by_a_second_frame_that_stands_still(why: str, takes: int) -> None:
+    """Its other heartbeat was taken for a sign of life: 30 N behind the plug of the cell, for one length of the lease."""
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    rig.beats, rig.is_cell_silent = False, why == "a silent cell"
+    rig.run(1.0)
+    if why == "another owner":
+        rig.write(0, ENABLE, 800, 0, 0, 1)
+        if takes:
+            rig.write(0, ENABLE | takes, 3000, 0, 0, FIRST, peer=OTHER)
+        rig.write(0, ENABLE | TAKE, 800, 0, 0, 2)
+    began = 0
+    for cycle in range(60):
+        if cycle == 20:
+            rig.is_cell_silent = False
+            began = len(rig.trace)
+        if why == "another owner" and cycle <= 20:
+            rig.write(0, *((ENABLE, 800, 0, 0, 3 + cycle) if cycle < 20 else (0,)))
+        refused = rig.answer(0, ENABLE | takes, 3000, 0, 0, FIRST, peer=OTHER)
+        rig.answer(4, SECOND, peer=OTHER)
+        rig.run(CYCLE_S)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert max(force_n for _, _, force_n in rig.trace[began + 50 :]) < 1.0
+
+
+def test_a_tare_is_taken_again_by_no_second_frame_that_stands_still() -> None:
+    rig = SmallRig(settings(lease_s=LEASE_S)).run(1.0)
+    answers = []
+    for _ in range(20):
+        answers.append(rig.run(CYCLE_S).answer(0, TARE, 0, 0, 0, FIRST))
+        rig.write(4, SECOND)
+    assert all(answers[2:])
