@@ -117,8 +117,7 @@ def compose_diagnosis(
     is_doubted = any(
         now.confidence < min(_SURE, each.confidence) for now, each in zip(causes, named_causes, strict=True)
     )
-    causes += _direct_causes(bench, reported, findings.evidence, noise.floor_n)
-    causes.sort(key=lambda cause: cause.gain.held_out_rms_after_n**2 - cause.gain.held_out_rms_before_n**2)
+    causes = _strongest_first([*causes, *_direct_causes(bench, reported, findings.evidence, noise.floor_n)])
     unseen = _unseen(findings, found, causes)
     told = {*_names_in_groups(causes), *(each.name for each in causes), *(each.name for each in unseen)}
     duration_s = sum(each.duration_s for each in bench.measurements)
@@ -142,6 +141,13 @@ def compose_diagnosis(
         experiments=_experiments_for_groups(causes),
         notes=tuple(_notes(bench, reported, noise, dropped)),
     )
+
+
+def _strongest_first(causes: Sequence[Cause]) -> list[Cause]:
+    def squared_gain_n2(cause: Cause) -> float:
+        return cause.gain.held_out_rms_before_n**2 - cause.gain.held_out_rms_after_n**2
+
+    return sorted(causes, key=squared_gain_n2, reverse=True)
 
 
 def _noise_floor(

@@ -7,6 +7,7 @@ from gateway.diagnosis.force_error import (
     CommandedForce,
     ErrorBlock,
     GainVerdict,
+    _interval,
     commanded_force,
     compare_runs,
     error_blocks,
@@ -137,3 +138,7 @@ def test_each_task_weighs_as_many_rows_as_the_run_with_fewer_of_them_has() -> No
 
     change = compare_runs(played(100, 10), played(50, 40))
     assert change.before_rms_n == change.after_rms_n == pytest.approx(((50 * 1.0 + 10 * 9.0) / 60) ** 0.5)
+
+
+def test_an_interval_of_95_percent_leaves_a_fortieth_out_at_either_end() -> None:
+    assert _interval(np.arange(1001.0)) == pytest.approx((25.0, 975.0))

@@ -10,7 +10,9 @@ from gateway.catalogue.all_effects import BY_NAME, EFFECTS
 from gateway.diagnosis import Options, Verdict, diagnose
 from gateway.diagnosis.experiments import identifiability
 from gateway.diagnosis.experiments.identifiability import _why
-from gateway.diagnosis.verdict import _decide_verdict
+from gateway.diagnosis.noise.noise_floor import NoiseFloor
+from gateway.diagnosis.result import FloorSource
+from gateway.diagnosis.verdict import _decide_verdict, _Noise, _plant_of, _strongest_first
 from tests.diagnosis.machine import MACHINE, NOISE_N, recorded, times_s
 
 THERE: Any = ("something",)
@@ -62,3 +64,31 @@ def test_what_readings_tell_by_themselves_is_never_among_what_a_recording_cannot
     found = identifiability.find_invisible_effects(bench, EFFECTS, nothing, frozenset({"creep"}))
     told = {effect.name for effect in EFFECTS if not effect.direct and effect.name != "creep"}
     assert {each.name for each in found} == told and all(each.why for each in found)
+
+
+def test_the_cause_that_makes_most_of_the_squared_error_is_told_first() -> None:
+    """Of 1.0 N the way from 1.0 to 0.8 is longer than that from 0.5 to 0.25, though its difference is smaller."""
+    gains = {"weak": (0.5, 0.25), "strong": (1.0, 0.8), "none": (0.3, 0.3)}
+    causes: Any = [
+        SimpleNamespace(name=name, gain=SimpleNamespace(held_out_rms_before_n=before_n, held_out_rms_after_n=after_n))
+        for name, (before_n, after_n) in gains.items()
+    ]
+    assert [cause.name for cause in _strongest_first(causes)] == ["strong", "weak", "none"]
+
+
+def test_what_is_left_reaches_a_floor_within_what_that_floor_is_unsure_by() -> None:
+    for error_share, left_n, is_reached in (
+        (0.0, 1.04, True),
+        (0.0, 1.06, False),
+        (0.1, 1.14, True),
+        (0.1, 1.16, False),
+    ):
+        noise = _Noise(2.0, NoiseFloor(1.0, FloorSource.RESTS, error_share), 1.0, None)
+        assert noise.is_reached(left_n) is is_reached, (error_share, left_n)
+
+
+def test_the_zero_of_a_machine_that_was_recorded_several_times_is_the_mean_of_theirs() -> None:
+    fitted: Any = SimpleNamespace(
+        parameters=SimpleNamespace(plant_of=lambda recording: MACHINE, offsets_n=(0.25, 0.5, 0.75))
+    )
+    assert _plant_of(fitted).cell.zero_n == 0.5

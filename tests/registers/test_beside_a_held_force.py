@@ -71,3 +71,17 @@ def test_a_count_of_cycles_beside_a_heartbeat_asks_control_for_nothing(make_bank
     master.write(10, 3)
     master.write(1, 1000)
     assert asked == [(), (), (), ("force_setpoint",)]
+
+
+def test_another_s_stop_is_remembered_with_the_owner_s_last_heartbeat_and_its_own_is_not(make_bank, master_of):
+    """Who has stopped may enable again with the heartbeat that stands; a program that hung beside another's stop may not."""
+    bank = make_bank(has_lease=True)
+    owner, other = master_of(bank, "10.0.0.1"), master_of(bank, "10.0.0.2")
+    lost = []
+    bank.held_enables.on_lost = lost.append
+    owner.write(0, 1, 0, 0, 0, 5)
+    owner.write(0, 0)
+    assert lost == []
+    owner.write(0, 1)
+    other.write(0, 0)
+    assert lost == [{"10.0.0.1": 5}]

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from gateway.control.command_edges import NO_EDGES, CommandTracker
+from gateway.control.settings import Defaults
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
@@ -116,3 +117,15 @@ def test_a_payload_on_its_way_arrives_at_once_where_the_force_ends() -> None:
     bench.disable()
     bench.step()
     assert bench.controller._commands.gravity_n == 0.0
+
+
+def test_under_a_force_a_payload_that_is_no_longer_told_goes_down_to_the_rig_s_own_and_not_below() -> None:
+    commands = CommandTracker(replace(settings(), defaults=Defaults(payload_kg=1.0)), lambda: 30.0)
+    commands.take(0.0, Command(payload_kg=2.0, number=1))
+    told = Command(number=2, force_ramp_n_per_s=5.0)
+    commands.take(10.0, Command(payload_kg=2.0, number=1))
+    weights_n = []
+    for k in range(60):
+        commands.take(10.0 + 0.05 * k, told)
+        weights_n.append(commands.gravity_n)
+    assert min(weights_n) == weights_n[-1] == pytest.approx(STANDARD_GRAVITY_M_PER_S2)

@@ -84,6 +84,11 @@ def test_a_recording_of_hours_is_known_by_its_first_minutes() -> None:
     assert find_suspects([measurement(time_s, volts, played_n, {})], MACHINE, is_own=True) == ()
 
 
+def test_rows_of_a_millisecond_that_count_as_seconds_are_told_even_of_few_rows() -> None:
+    (one,) = find_suspects([replace(COMMANDED, time_s=np.arange(float(TIME_S.size)))], MACHINE, is_own=True)
+    assert (one.code, one.column, one.other, one.is_sure) == (UNIT, "time_s", "", False)
+
+
 def test_only_the_rig_s_own_plant_or_a_number_beyond_any_makes_a_unit_sure() -> None:
     """The machine may be of another size: of what is asked only, causes are looked for all the same."""
     pounds = replace(COMMANDED, force_n=written_in("lbf", "force", "n", FORCE_N))

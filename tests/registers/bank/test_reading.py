@@ -76,9 +76,10 @@ def test_bits_lie_within_one_of_the_two_words(bank, address, count):
     assert caught.value.code == 2
 
 
-def test_the_identification_names_map_and_rig(bank):
+def test_the_identification_names_map_and_rig(bank, make_bank):
     assert bank.identity[0] == b"force-gateway"
     assert (bank.identity[5], bank.identity[6]) == (b"force-v1", b"demo")
+    assert make_bank(rig_name="süd-7").identity[6] == b"s?d-7", "it is ASCII, as long as the name"
 
 
 def test_a_whole_request_goes_through_the_server_core(bank, master):
