@@ -72,6 +72,7 @@ class AuditFile:
         self._folder = state / AUDIT
         self._longest_bytes, self._kept = longest_bytes, kept
         self._end = ChainEnd()
+        self._head, self._fresh_head = self._folder / HEAD, self._folder / f"{HEAD}.new"
         self._path, self._descriptor = self._folder, -1
         self._good_bytes = 0
         self._is_open = self._is_torn = False
@@ -140,10 +141,9 @@ class AuditFile:
 
     def _head_of_before(self) -> ChainEnd | None:
         """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
-        head = self._folder / HEAD
         with contextlib.suppress(FileNotFoundError):
-            if not other_kind(head):
-                os.close(open_plain(head))
+            if not other_kind(self._head):
+                os.close(open_plain(self._head))
         return read_head(self._folder)
 
     def _doubt(self, head: ChainEnd | None, files: list[Path]) -> str:
@@ -213,12 +213,11 @@ class AuditFile:
 
     def _write_head(self) -> None:
         text = json.dumps({"n": self._end.number, "sha256": self._end.sha256})
-        fresh = self._folder / f"{HEAD}.new"
-        with open_plain_stream(fresh, "wb") as stream:
+        with open_plain_stream(self._fresh_head, "wb") as stream:
             stream.write(text.encode("ascii"))
             stream.flush()
             os.fsync(stream.fileno())
-        fresh.replace(self._folder / HEAD)
+        self._fresh_head.replace(self._head)
 
     def _rotate_if_full(self) -> None:
         if self._good_bytes < self._longest_bytes:

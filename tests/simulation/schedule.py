@@ -308,8 +308,9 @@ class Simulation:
         if settings:
             self.reasons.note_settings(settings, now_s)
             self.zeros.note_settings(settings, now_s)
-        self.observer.look(now_s)
-        self.lease.look(now_s)
+        if not self.observer.is_safe:
+            self.observer.look(now_s)
+            self.lease.look(now_s)
         is_whole = bool(settings) and self.observer.control_lost_s is None and self.around.is_whole
         self.cell.look(settings, now_s, is_whole=is_whole)
         self.outside.call_later(LOOK_S, self._look)

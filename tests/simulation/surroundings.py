@@ -135,14 +135,14 @@ class Surroundings:
 
     def look(self) -> None:
         """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""
-        observer = self._observer
-        observer.cell_heard_s = observer.cell_said_s if observer.history.is_plain else CABLES["load_cell"].heard_s
+        observer, output, cell = self._observer, CABLES["output"], CABLES["load_cell"]
+        observer.cell_heard_s = observer.cell_said_s if observer.history.is_plain else cell.heard_s
         is_noisy = self.world.settings.number("wire.noise") > 0.0
-        observer.answer_spoiled_s = self._outside.time() if is_noisy else CABLES["output"].spoiled_s
+        observer.answer_spoiled_s = self._outside.time() if is_noisy else output.spoiled_s
         if observer.cell_lost_s is not None:
-            observer.cell_lost_s = max(observer.cell_lost_s, CABLES["load_cell"].strange_s)
+            observer.cell_lost_s = max(observer.cell_lost_s, cell.strange_s)
         if observer.answers_lost_s is not None:
-            observer.answers_lost_s = max(observer.answers_lost_s, CABLES["output"].strange_s)
+            observer.answers_lost_s = max(observer.answers_lost_s, output.strange_s)
         self._judge_watchdog()
 
     def _judge_watchdog(self) -> None:
@@ -173,9 +173,10 @@ class Surroundings:
         disturbed = [line for line, cable in CABLES.items() if cable.is_disturbed(now_s)]
         is_slow, is_dark = self.cell_pace != 1.0, now_s < self._dark_until_s + NOTICED_S
         self.is_whole = not (disturbed or is_slow or is_dark)
-        for line in (*disturbed, *sorted(self._pulled)):
-            reasons.note(line, now_s)
-        self._pulled.clear()
+        if disturbed or self._pulled:
+            for line in (*disturbed, *sorted(self._pulled)):
+                reasons.note(line, now_s)
+            self._pulled.clear()
         if is_slow:
             reasons.note(CELL, now_s)
         if is_dark:

@@ -21,7 +21,7 @@ class LoopHealth:
         """Count one tick. expirations: periods since the last one; late_s: lateness."""
         self.ticks += expirations
         self.missed_ticks += expirations - 1
-        self.lateness[min(31, int(max(0.0, late_s) * 1e6).bit_length())] += 1
+        self.lateness[min(31, int(late_s * 1e6).bit_length()) if late_s > 0.0 else 0] += 1
 
     def lateness_us(self, share: float) -> int:
         """Return the upper bound in us of the lateness that this share of the ticks stayed under."""

@@ -97,10 +97,10 @@ class Cable:
     def is_disturbed(self, now_s: float) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
         strange_since_s = now_s - STRANGE_S
-        return (
+        return bool(
             self.strange_s > strange_since_s
             or self.spoiled_s > strange_since_s
-            or bool(self._spoils)
+            or self._spoils
             or not self.is_plugged
             or self.is_deaf
             or self.reworded[0] != self.reworded[1]
