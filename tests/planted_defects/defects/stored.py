@@ -107,7 +107,7 @@ DEFECTS = (
     Defect("a column of Parquet has its unit's factor alone", "recording/tables/parquet_table.py",
            "values * pick.factor + pick.offset", "values * pick.factor", ("recording/tables/test_column_mapping.py",)),
     Defect("the head of an audit takes its name before its bytes are on the disk", "audit/audit_file.py",
-           "            os.fsync(stream.fileno())\n        fresh", "        fresh",
+           "            os.fsync(stream.fileno())\n        self._fresh", "        self._fresh",
            ("audit/test_removed_while_written.py",)),
     Defect("where recordings stay for hours no clock is doubted", "recording/care/clock_doubt.py",
            "fresh_s = min(_DAY_S, 0.5 * days * _DAY_S)", "fresh_s = _DAY_S",
