@@ -126,6 +126,9 @@ def test_a_gap_of_two_intervals_is_one_that_is_missing_and_a_late_one_is_none() 
         "four at once, none missing"
     )
     assert intervals_of([0.0, 1.0, 2.0, 6.0, 7.0], [0, 0, 0, 1, 0]) == Intervals(1.0, 3.0, 2)
+    assert intervals_of([0.0, 2.0, 4.0, 6.0, 7.0], [0, 1, 1, 1, 0]) == Intervals(1.0, 1.0, 0), (
+        "most have brought another"
+    )
     assert intervals_of([0.0, 1.0, 2.0, 3.9, 4.0, 5.0]).missing == 0, "late, with the next one close behind"
     assert intervals_of([0.0, 1.0, 2.0, 4.6, 4.8, 5.0, 6.0, 8.0, 9.0]).missing == 1, (
         "two late, and later one that never came"

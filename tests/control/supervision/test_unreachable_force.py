@@ -139,6 +139,7 @@ def test_whatever_is_seen_is_told_with_the_pressure_that_was_measured(pressure_p
     told = unreachable_words(seen)
     assert "None" not in told and "nan" not in told
     assert told.startswith(f"{pressure_pa / 1e3:.0f} kPa measured, 100 kPa expected") or pressure_pa != pressure_pa
+    assert factor < 1.0 or "no air" not in told, "more force than asked has air"
 
 
 def test_a_force_that_was_right_before_this_enable_counts_for_nothing() -> None:
