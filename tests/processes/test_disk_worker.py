@@ -40,6 +40,7 @@ def test_work_that_no_thread_can_be_had_for_is_refused_for_good(monkeypatch: pyt
 
 def test_what_is_asked_for_behind_the_end_is_refused_as_by_a_disk_and_never_done() -> None:
     """A commit whose check was under way goes on to its next part, after the rig has closed: no defect of ours."""
+    join_disk_threads()  # those of tests before
     done: list[str] = []
 
     async def main() -> list[Any]:
@@ -70,6 +71,8 @@ def own_switching() -> Iterator[None]:
 def test_work_that_calculates_does_not_hold_up_the_loop(own_switching: None) -> None:
     """Else it calculates for 5 ms more at each wake-up. Asked is what it has had of a processor meanwhile, which a busy machine
     does not change as it does the time that passes."""
+
+    join_disk_threads()
 
     async def main() -> list[float]:
         worker, ended, calculated_s = DiskWorker(), threading.Event(), list[float]()

@@ -73,7 +73,7 @@ def test_who_may_not_calibrate_is_told_which_role_it_takes(
     answer = call("calibrate", "--yes", "--gateway", serve(bank, role=Role.MONITOR).address)
     assert answer.exit_code == 1
     assert answer.stderr.startswith(
-        "W211 role too low: exception 01 (function not served) to write 1 at 0; control_word"
+        "W211 role too low: exception 01 (function not served) to write 5 at 0; control_word"
     )
     assert "Connect with a certificate of the role" in answer.stderr
 
