@@ -65,6 +65,10 @@ def ear() -> Ear:
 
 @pytest.fixture
 def line() -> Iterator[Pty]:
+    """A pty above numbers that are free: what else runs on the machine takes those, and not the one that this pty loses."""
+    lower = [Pty() for _ in range(8)]
     pty = Pty()
+    for each in lower:
+        each.close()
     yield pty
     pty.close()

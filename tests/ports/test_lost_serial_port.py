@@ -131,7 +131,7 @@ def test_a_lost_port_that_is_found_elsewhere_is_opened_there_at_once(ear: Any, l
     asyncio.run(scene())
 
 
-def successor_of(line: Pty, most: int = 32) -> list[Pty]:
+def successor_of(line: Pty, most: int = 64) -> list[Pty]:
     """Ptys of somebody else, the last of them under the number of this one, which has lost its device."""
     others = [Pty()]
     while others[-1].path != line.path:
