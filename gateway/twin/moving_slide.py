@@ -23,7 +23,7 @@ class MovingSlide:
         self._chamber = self._lag_of(plant)
         self._gauge_pa = self._chamber_pa = 0.0
         self.state = SlideState()
-        self._still: tuple[object, ...] = ()  # slide, state and loads of a step that has moved nothing
+        self._stepped: tuple[object, ...] = ()  # slide, state and loads that the last step was computed from
 
     def _lag_of(self, plant: Plant) -> RampShares | None:
         lag_s = plant.cylinder.chamber_lag_s
@@ -108,11 +108,8 @@ class MovingSlide:
             self._gauge_pa = pressure_pa
         thrust_n = self._slide.area_m2 * pressure_pa
         loads_n = (thrust_n, self._side_n + self._side_share * thrust_n, self._more_out_n, self._disturbance_n)
-        if (step := (self._slide, self.state, loads_n)) != self._still:
-            state = advance_slide(*step, self._step_s, self._step_s)
-            if state == self.state:
-                self._still = step
-            self.state = state
+        if (step := (self._slide, self.state, loads_n)) != self._stepped:  # else it moves nothing, like the one before
+            self._stepped, self.state = step, advance_slide(*step, self._step_s, self._step_s)
         return self.state.force_n
 
     def _place(self) -> None:

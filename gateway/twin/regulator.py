@@ -135,7 +135,7 @@ class RegulatorState:
         self._step_s, self._voltage_v = step_s, 0.0
         self._take(regulator)
         self._target, self._state = HeldTarget(), PressureState()
-        self._still: tuple[object, ...] = ()  # state, target and shares of a time in which nothing has changed
+        self._followed: tuple[object, ...] = ()  # state, target and shares that the last state was computed from
         self._since_s = 0.0
         self._now, self._seen_pa = 0, 0.0
         self._arriving: deque[tuple[float, float]] = deque()
@@ -214,11 +214,8 @@ class RegulatorState:
         """Live under the target that is seen now."""
         target = self._seen_pa if self.air else 0.0
         shares = self._shares if held_s == self._step_s else _kept_lag_shares(self._lags, held_s)
-        if (held := (self._state, target, shares)) != self._still:
-            state = follow_target(*held)
-            if state == self._state:
-                self._still = held
-            self._state = state
+        if (held := (self._state, target, shares)) != self._followed:  # else it changes nothing, like the one before
+            self._followed, self._state = held, follow_target(*held)
         return self._state.slewed_pa
 
     def _held_pa(self) -> float:
