@@ -131,15 +131,18 @@ COLLECT_AT = (20_000, 20, 20)
 
 DESCRIPTORS = "/proc/self/fd/"
 
-BEHIND_REAL_TIME = 5
-"""Nice value of the workers that run what waits for no clock."""
-
-REAL_TIME = ("end_to_end/", "ports/", "service/probing/", "service/running_rig/lines/load_cell/test_baud_probe.py")
+REAL_TIME = ("end_to_end/", "ports/")
 """What starts processes or waits for real lines: one worker runs it one after the other, so that bounds in seconds do
 not compete with each other, and no worker that has something to calculate waits."""
 
-LONG_WAITS = ("end_to_end/first_hour/test_calibrate.py", "end_to_end/first_hour/test_experiment_run.py")
-"""Of these, what waits for minutes while a plan is run, and is held to no second: another worker does that meanwhile."""
+LONG_WAITS = (
+    "end_to_end/first_hour/test_calibrate.py",
+    "end_to_end/first_hour/test_experiment_run.py",
+    "service/probing/",
+    "service/running_rig/lines/load_cell/test_baud_probe.py",
+)
+"""What waits for minutes while a plan is run or a port is asked what is there, and is held to no second: another worker does
+that meanwhile."""
 
 IN_REAL_TIME = ("real time", "long waits")
 
@@ -184,7 +187,7 @@ def group_of(nodeid: str) -> str:
     if name.startswith(SPREAD):
         return name
     path = name.partition("::")[0]
-    if path in LONG_WAITS:
+    if path.startswith(LONG_WAITS):
         return "long waits"
     return "real time" if path.startswith(REAL_TIME) else path
 
@@ -203,12 +206,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items.sort(key=lambda item: (begun_at(item.nodeid), item.path))  # stable: within a file nothing moves
     if not config.getoption("--long"):
         leave_out_long(items, in_silence=is_shared)
-
-
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Workers of pure tests step back behind the one that is held to seconds."""
-    if hasattr(item.config, "workerinput") and group_of(item.nodeid) not in IN_REAL_TIME:
-        os.setpriority(os.PRIO_PROCESS, 0, max(BEHIND_REAL_TIME, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
 @pytest.fixture(scope="session")

@@ -25,7 +25,7 @@ from tests.conftest import (
     group_of,
     leave_out_long,
 )
-from tests.gate.workers import OneCompiler, is_needed
+from tests.gate.workers import NICE, OneCompiler, is_needed
 
 TESTS = Path(__file__).parents[1]
 INTERRUPTED = """
@@ -67,7 +67,7 @@ def test_all_that_is_in_real_time_is_one_group_and_begins_first() -> None:
 
 
 def test_what_waits_for_minutes_is_the_second_group() -> None:
-    nodeids = [f"tests/{file}::test_a" for file in LONG_WAITS]
+    nodeids = [f"tests/{place}::test_a" for place in LONG_WAITS]
     assert {(group_of(nodeid), begun_at(nodeid)) for nodeid in nodeids} == {("long waits", 1)}
 
 
@@ -157,6 +157,17 @@ def test_a_group_that_waits_has_a_worker_beside_those_that_have_something_to_do(
         told.append(run.communicate()[0])
         (tmp_path / "done").unlink()
     assert "2 passed" in told[0] and "alone" in told[1]
+
+
+def test_only_what_waits_for_a_clock_keeps_its_place_before_others(tmp_path: Path) -> None:
+    rank = "f'{os.getpriority(os.PRIO_PROCESS, 0)} {os.sched_getscheduler(0)}'"
+    tell = f"def test_a(): Path(__file__ + '.told').write_text({rank})\n"
+    conftest = CONFTEST.replace("[0]))", '[0], ["test_a_waits.py"]))')
+    run = run_in_workers(tmp_path, conftest=conftest, a_waits=tell, does=tell)
+    assert "2 passed" in run.communicate()[0]
+    waiting, stepped_back = ((tmp_path / f"test_{name}.py.told").read_text().split() for name in ("a_waits", "does"))
+    assert int(waiting[0]) == os.getpriority(os.PRIO_PROCESS, 0) and int(waiting[1]) == os.sched_getscheduler(0)
+    assert int(stepped_back[0]) >= NICE and int(stepped_back[1]) == os.SCHED_BATCH
 
 
 def test_a_worker_that_dies_fails_its_test_and_another_one_goes_on_behind_it(tmp_path: Path) -> None:

@@ -22,6 +22,8 @@ TELLING_S: Final = 0.1
 NUMBER: Final = 4
 """Bytes of the place of a group or a test."""
 INTERRUPT: Final = {signal.SIGINT}
+NICE: Final = 5
+"""Of a worker whose tests wait for no clock."""
 NO_TEST: Final = b"\xff" * NUMBER
 
 
@@ -119,6 +121,13 @@ def ending_the_process(terminal: int) -> Iterator[None]:
         os._exit(1)
 
 
+def step_back() -> None:
+    """Let this process and what it starts run when those that are held to seconds leave a core to it, and then for longer at a
+    time: four workers on two cores, which take turns in milliseconds, read their memory anew at each turn."""
+    os.setpriority(os.PRIO_PROCESS, 0, max(NICE, os.getpriority(os.PRIO_PROCESS, 0)))
+    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
 def own_threads() -> set[str]:
     """Names of this process's threads beside its first, which a fork does not take along. That of pyarrow's allocator, which it
     starts again in each process, is none of them."""
@@ -135,7 +144,7 @@ class Worker(NamedTuple):
 
 class ForkedWorkers:
     """Runs what is collected in `count` processes, each group (`group_of` a test's id) in one of them, in its order. Each group
-    of `waiting`, which leaves its core to others, has one more."""
+    of `waiting`, which leaves its core to others, has one more, and the others step back behind it."""
 
     def __init__(self, count: int, group_of: Callable[[str], str], waiting: Collection[str] = ()) -> None:
         self._count, self._group_of, self._waiting = count, group_of, waiting
@@ -186,9 +195,12 @@ class ForkedWorkers:
     def _take_groups(self, first: list[int]) -> Iterator[list[int]]:
         if first:
             yield first
-        groups = list(self._groups.values())
+        names = list(self._groups)
         while number := os.read(self._queue, NUMBER):
-            yield groups[int.from_bytes(number)]
+            name = names[int.from_bytes(number)]
+            if name not in self._waiting:
+                step_back()
+            yield self._groups[name]
 
     def _listen(self, session: pytest.Session) -> None:
         """Pass on what the workers tell, until each has ended."""
