@@ -47,7 +47,7 @@ class ForceCeiling:
         """Take in a stair that has ended."""
         self._rest_n = row.rest_n
         if row.stair.direction < 0:
-            self._last = self._before = None
+            self._last = None
         else:
             self._before, self._last = self._last, (row.stair.voltage_v, row.force_n)
 
