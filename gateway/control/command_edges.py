@@ -149,6 +149,11 @@ class CommandTracker:
         """Let nothing begin by a heartbeat of before."""
         self._lease.let_no_beat_count()
 
+    @property
+    def has_moved(self) -> bool:
+        """Decide whether the heartbeat of a frame has moved since the lease was started."""
+        return self._lease.has_moved
+
     def is_lease_lost(self, now_s: float, owner_connected: bool) -> bool:
         """Return whether the master is lost: disconnected, or without a heartbeat for one length of the lease."""
         return self._lease.is_lost(now_s, owner_connected)

@@ -61,6 +61,7 @@ class Transitions:
         self._unbeaten = 0  # number of the last command that came while no master beat
         self.held_n = 0.0  # for a lost master
         self.is_restarted = is_restarted  # and nobody has acknowledged that
+        self._is_behind_restart = is_restarted  # as long as this process lives
         self.outcome = StepOutcome()  # what the present step wants besides the voltage
         self.parts = parts
         self._safe_voltage = SafeVoltageCheck(parts.faults)
@@ -180,9 +181,13 @@ class Transitions:
         return demand._replace(force_n=min(demand.force_n, self.held_n)) if self.is_master_lost else demand
 
     def lose_master(self, now_s: float, observation: str, action: LeaseAction) -> None:
-        """Act as the rig says where the lease is over. observation: how it was noticed."""
+        """Act as the rig says where the lease is over. observation: how it was noticed. Behind a restart, by a power cut say,
+        nobody knows whose program had hung: the last frame of one, sent on and on, enables, too. Nothing is held for that one,
+        or it would press until somebody comes."""
         self.outcome.release_owner = True
         self.lost_s = now_s
+        if action is LeaseAction.HOLD and self._is_behind_restart and not self.parts.commands.has_moved:
+            action, observation = LeaseAction.RAMP, f"{observation}, and none that moved since the restart"
         if action is LeaseAction.FAULT:
             self.fail(now_s, stop_cause(FaultCode.MASTER_LOST, f"{observation}, safe voltage"))
             return

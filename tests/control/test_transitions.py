@@ -23,7 +23,7 @@ STALE = StopCause(FaultCode.SAMPLE_STALE, "A311 stale")
 class Parts:
     """Everything that a change acts on, and what it was told."""
 
-    def __init__(self, *, is_running: bool = False) -> None:
+    def __init__(self, *, is_running: bool = False, has_moved: bool = True, is_restarted: bool = True) -> None:
         self.did: list[str] = []
         note = self.did.append
         run = SimpleNamespace(
@@ -31,8 +31,9 @@ class Parts:
             leave=lambda loop, given_n: note("run.leave"), begin=lambda plan, is_local: note("run.begin"),
         )  # fmt: skip
         commands = SimpleNamespace(
-            who="10.0.0.1", start_lease=lambda now_s: note("lease"), expect_clearing=lambda: note("clearing")
-        )
+            who="10.0.0.1", start_lease=lambda now_s: note("lease"), expect_clearing=lambda: note("clearing"),
+            has_moved=has_moved,
+        )  # fmt: skip
         parts: Any = ControllerParts(
             commands,  # type: ignore[arg-type]
             SimpleNamespace(start=lambda: note("faults")),  # type: ignore[arg-type]
@@ -40,7 +41,7 @@ class Parts:
             SimpleNamespace(rest=lambda: note("loop.rest")),  # type: ignore[arg-type]
             run,  # type: ignore[arg-type]
         )
-        self.machine = Transitions(parts, is_restarted=True)
+        self.machine = Transitions(parts, is_restarted=is_restarted)
 
 
 def enabled(**running: bool) -> Parts:
@@ -101,6 +102,17 @@ def test_a_lost_master_ends_no_way_to_0_and_leaves_no_run_alone(
     assert parts.machine.is_master_lost and parts.machine.is_ramping_down is ramps
     assert parts.machine.outcome.release_owner
     assert ("ramping to 0 N" if ramps else "holding") in parts.machine.outcome.events[-1]
+
+
+@pytest.mark.parametrize(
+    ("is_restarted", "has_moved", "ramps"), [(True, False, True), (True, True, False), (False, False, False)]
+)
+def test_behind_a_restart_nothing_is_held_for_who_may_have_hung_before(
+    is_restarted: bool, has_moved: bool, ramps: bool
+) -> None:
+    parts = enabled(is_restarted=is_restarted, has_moved=has_moved)
+    parts.machine.lose_master(2.0, "no heartbeat", LeaseAction.HOLD)
+    assert parts.machine.is_master_lost and parts.machine.is_ramping_down is ramps
 
 
 def test_what_lets_go_of_the_force_forgets_where_it_was_going_and_has_the_command_cleared() -> None:

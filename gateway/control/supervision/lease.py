@@ -20,7 +20,7 @@ class Lease:
     def __init__(self, length_s: float | None) -> None:
         self._length_s = length_s
         self._heartbeat = 0
-        self._changed_s = -inf
+        self._changed_s = self._moved_s = -inf
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
         self._frames = FrameBeats()
@@ -35,6 +35,8 @@ class Lease:
         """Note the time of a heartbeat that this master has changed, in its frame of this channel."""
         if self._is_beat(heartbeat, who, channel):
             self._changed_s, self._master = now_s, who
+            if self._frames.knows(channel):
+                self._moved_s = now_s
             self._unbeaten.pop(who, None)
             keep_latest(self._beats, who, (heartbeat, now_s))
         self._heartbeat = heartbeat
@@ -79,6 +81,12 @@ class Lease:
     def age_s(self, now_s: float) -> float:
         """Return the time since the lease was renewed, s."""
         return now_s - max(self._changed_s, self._started_s)
+
+    @property
+    def has_moved(self) -> bool:
+        """Decide whether a frame has brought another heartbeat than before since the lease was started: its program does not
+        stand still. A frame's first one proves nothing."""
+        return self._moved_s > self._started_s
 
     def is_lost(self, now_s: float, owner_connected: bool) -> bool:
         """Return whether the owner is disconnected, or its heartbeat older than the lease; never without a lease."""

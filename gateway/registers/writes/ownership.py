@@ -104,6 +104,10 @@ class FrameBeats:
         """Decide whether this is what the frame has brought last."""
         return self._last.get(channel) == heartbeat
 
+    def knows(self, channel: Channel) -> bool:
+        """Decide whether the frame has come before."""
+        return channel in self._last
+
     def note(self, channel: Channel, heartbeat: int) -> bool:
         """Note what a frame brings; return whether that is another heartbeat than before, or its first."""
         is_new = not self.has_brought(channel, heartbeat)

@@ -97,3 +97,30 @@ def test_of_many_masters_those_are_known_that_have_beaten_last() -> None:
     for beat, who in ((2063, "10.0.0.1"), (1062, "10.0.1.62"), (7, "10.0.0.9")):
         assert not lease.would_have_beaten_since(200.0, beat, who), who
     assert lease.would_have_beaten_since(200.0, 1000, "10.0.1.0"), "who has been forgotten"
+
+
+def test_who_has_beaten_since_its_last_takeover_has_a_lease_of_its_own_at_the_next() -> None:
+    lease = Lease(1.0)
+    lease.take_over(0.0, "a")
+    lease.observe(0.1, 5, "a")
+    lease.take_over(0.5, "b")
+    assert lease.would_start_for("a") and not lease.would_start_for("b")
+    lease.take_over(0.8, "a")
+    lease.take_over(0.9, "b")
+    assert not lease.would_start_for("a"), "it has taken over again, and not beaten since"
+
+
+def test_a_frame_moves_with_its_second_heartbeat_and_one_that_was_started_anew_has_to_move_again() -> None:
+    lease, block, word = Lease(1.0), ("a", 4001, 0, 26), ("a", 4001, 4, 2)
+    lease.observe(0.0, 7, "a", block)
+    lease.start(0.0, "a")
+    for now_s, heartbeat, channel, has_moved in (
+        (0.1, 7, block, False),
+        (0.2, 8, word, False),
+        (0.3, 7, block, False),
+        (0.4, 9, block, True),
+    ):
+        lease.observe(now_s, heartbeat, "a", channel)
+        assert lease.has_moved is has_moved
+    lease.start(0.5, "a")
+    assert not lease.has_moved

@@ -119,9 +119,12 @@ class Relay:
 
 
 class SmallRig:
-    """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease."""
+    """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease.
+    is_restarted: the process before has ended without a word."""
 
-    def __init__(self, control: ControlSettings | None = None, *, seed: int = 1, **plant: float) -> None:
+    def __init__(
+        self, control: ControlSettings | None = None, *, seed: int = 1, is_restarted: bool = False, **plant: float
+    ) -> None:
         self.settings = control or settings()
         self.ticks = 0
         self.is_cell_silent = False
@@ -141,7 +144,7 @@ class SmallRig:
             | (ControlBit.VALVE_PULL if self.settings.valve else ControlBit(0)),
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
-        self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1))
+        self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1), unclean_restart=is_restarted)
         self.loop = ControlLoop(
             self.bank,
             self.controller,
