@@ -113,4 +113,12 @@ DEFECTS = (
     Defect("a zero is one reading of each few", "control/tare.py",
            "self._recent_n.append(self._sum_n / self._samples)", "self._recent_n.append(force_n)",
            ("control/zero/test_zero.py",)),
+    Defect("behind a restart a force is held for a program that had hung", "control/transitions.py",
+           "and self._is_behind_restart and not self.parts.commands.has_moved", "and False",
+           ("service/running_rig/masters/test_held_behind_a_restart.py",)),
+    Defect("the first heartbeat of a frame is one that has moved", "control/supervision/lease.py",
+           "if self._frames.knows(channel):\n", "if True:\n",
+           ("control/supervision/test_lease.py",)),
+    Defect("who has beaten since its takeover counts as hung at the next", "control/supervision/lease.py",
+           "            self._unbeaten.pop(who, None)\n", "", ("control/supervision/test_lease.py",)),
 )  # fmt: skip
