@@ -44,6 +44,7 @@ class CommandTracker:
         self.not_finite = ""
         self._word = 0
         self._lease = Lease(settings.supervision.lease_s)
+        self.beats_of = self._lease.beats_of
         self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
         self._direction = 1.0

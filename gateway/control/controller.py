@@ -66,7 +66,7 @@ class Controller:
         self._checks = EdgeCheck(self._commands, self._conditioner, self.active_run, self._valve, self.most_pull_n)
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
-        self._reading, self._line = NO_READING, LineStatus()
+        self._reading, self._line, self.beats_of = NO_READING, LineStatus(), self._commands.beats_of
         self._last_s: float | None = None
         self._moved_by: LoopInputs | None = None  # what the force loop has just moved by
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)

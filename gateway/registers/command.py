@@ -11,9 +11,9 @@ from gateway.registers.words import ControlBit, LimitedBy, Mode, State
 
 _NO_BIT: Final = ControlBit(0)
 
-Channel: TypeAlias = tuple[str, int, int, int]
-"""Host, port, address and bytes of a write: a master that writes in cycles has one for each of its frames."""
-NO_CHANNEL: Final = ("", 0, 0, 0)
+Channel: TypeAlias = tuple[str, str, int, int, int]
+"""Identity, host, port, address and bytes of a write: a master that writes in cycles has one for each of its frames."""
+NO_CHANNEL: Final = ("", "", 0, 0, 0)
 
 
 class Command(NamedTuple):

@@ -6,7 +6,7 @@ import copy
 import os
 import socket
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 from gateway.devices import DeviceProfile
@@ -32,8 +32,8 @@ def told_of_reply(host: OutputHost, profile: DeviceProfile) -> dict[str, Any]:
 
 class GuardianLine:
     """Our end of the guardian's line. memory: where the loop beats; without it each beat is a message. on_ports: the simulated
-    rig has been started again, with these ptys; rig_pid: its process, None for a real rig. left_beat: the master's heartbeat at
-    the last beat of the process before, None where nobody knows; kept: what the guardian has been told for the next one.
+    rig has been started again, with these ptys; rig_pid: its process, None for a real rig. left_beats: the owner's heartbeats
+    at the last beat of the process before, None where nobody knows; kept: what the guardian has been told for the next one.
 
     A guardian that does not read for a while misses heartbeats, which is what its silence deserves, but nothing else:
     what does not fit waits, in order, for the next heartbeat.
@@ -44,7 +44,7 @@ class GuardianLine:
         self.rig_pid: int | None = None
         self._link = link
         self._memory = memory
-        self.left_beat = None if memory is None else memory.master_beat
+        self.left_beats = None if memory is None else memory.master_beats
         self.kept: dict[str, Any] = {}
         self._waiting: deque[tuple[str, dict[str, Any], tuple[int, ...]]] = deque()
         self._rig: asyncio.Future[dict[str, Any]] = asyncio.get_running_loop().create_future()
@@ -60,15 +60,15 @@ class GuardianLine:
         ptys: dict[str, str] | None = answer.get("ptys")
         return ptys
 
-    def heartbeat(self, now_s: float, owner: str | None = None, master_beat: int = 0) -> None:
+    def heartbeat(self, now_s: float, owner: str | None = None, master_beats: Sequence[int] = (0,)) -> None:
         """Send what the line could not take before, and beat. now_s: monotonic; owner: master that owns the setpoint now;
-        master_beat: value of its heartbeat."""
+        master_beats: what its frames bring as its heartbeat."""
         if owner != self.kept.get("owner"):
             self.keep(owner=owner)
         if self._waiting:
             self._send_waiting()
         if self._memory is not None:
-            self._memory.beat(now_s, master_beat)
+            self._memory.beat(now_s, master_beats)
             return
         if now_s < self._next_beat_s:
             return

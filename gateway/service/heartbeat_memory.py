@@ -1,4 +1,4 @@
-"""The heartbeat of the control loop in memory that it shares with the guardian: when it beat last. Beside it stands that of the
+"""The heartbeat of the control loop in memory that it shares with the guardian: when it beat last. Beside it stand those of the
 master, for the control process that is started next.
 
 A beat is one store of eight bytes, and wakes nobody: the guardian looks when the next one is overdue, a tenth as often as the
@@ -8,9 +8,11 @@ second. The clock is the machine's monotonic one, so both mean the same time. St
 
 import mmap
 import os
+from collections.abc import Sequence
 from typing import Final
 
-_BYTES: Final = 16
+_MOST_BEATS: Final = 7
+_BYTES: Final = 8 * (1 + _MOST_BEATS)
 
 
 class HeartbeatMemory:
@@ -22,6 +24,7 @@ class HeartbeatMemory:
             os.ftruncate(descriptor, _BYTES)
         self._map = mmap.mmap(descriptor, _BYTES)
         self._numbers = memoryview(self._map).cast("d")  # one store of eight aligned bytes each: never half a number
+        self._master_beats: Sequence[int] = ()
 
     @property
     def beat_s(self) -> float:
@@ -29,13 +32,17 @@ class HeartbeatMemory:
         return self._numbers[0]
 
     @property
-    def master_beat(self) -> int:
-        """Value of the master's heartbeat at the last beat; 0 before the first."""
-        return int(self._numbers[1])
+    def master_beats(self) -> tuple[int, ...]:
+        """Values of the master's heartbeat at the last beat, one or more; 0 before the first."""
+        return tuple({int(beat): None for beat in self._numbers[1:]})
 
-    def beat(self, now_s: float, master_beat: int = 0) -> None:
-        """Write the time of a beat, and the value of the master's heartbeat. now_s: monotonic."""
-        self._numbers[0], self._numbers[1] = now_s, master_beat
+    def beat(self, now_s: float, master_beats: Sequence[int] = (0,)) -> None:
+        """Write the time of a beat, and what the master's frames bring as its heartbeat. now_s: monotonic."""
+        self._numbers[0] = now_s
+        if master_beats != self._master_beats:
+            self._master_beats = master_beats
+            for place in range(_MOST_BEATS):
+                self._numbers[1 + place] = master_beats[place if place < len(master_beats) else 0]
 
     def close(self) -> None:
         """Close the memory."""

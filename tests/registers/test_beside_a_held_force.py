@@ -84,4 +84,4 @@ def test_another_s_stop_is_remembered_with_the_owner_s_last_heartbeat_and_its_ow
     assert lost == []
     owner.write(0, 1)
     other.write(0, 0)
-    assert lost == [{"10.0.0.1": 5}]
+    assert lost == [{"10.0.0.1": [5]}]

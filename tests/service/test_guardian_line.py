@@ -35,8 +35,8 @@ def test_a_loop_that_beats_in_memory_wakes_nobody(ends: Pair) -> None:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
         for tick in range(100):
-            guardian.heartbeat(tick * 0.004, None, 65535 - tick)
-        assert HeartbeatMemory(memory).master_beat == 65436
+            guardian.heartbeat(tick * 0.004, None, [65535 - tick, 7, 65535 - tick, tick])
+        assert HeartbeatMemory(memory).master_beats == (65436, 7, 99)
         ends[0].setblocking(False)
         with pytest.raises(BlockingIOError):
             message_link.receive(ends[0])
@@ -46,14 +46,14 @@ def test_a_loop_that_beats_in_memory_wakes_nobody(ends: Pair) -> None:
     os.close(memory)
 
 
-def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heartbeat(ends: Pair) -> None:
+def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heartbeats(ends: Pair) -> None:
     memory = os.memfd_create("beat")
 
     async def scene() -> None:
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
         for tick, owner in enumerate(("10.0.0.5", "10.0.0.5", None, None)):
-            guardian.heartbeat(0.01 * tick, owner, 7 + tick)
+            guardian.heartbeat(0.01 * tick, owner, range(tick, tick + 9))
         told = [message_link.receive(ends[0]) for _ in range(2)]
         assert [message and message.body for message in told] == [{"owner": "10.0.0.5"}, {"owner": None}]
         guardian.close()
@@ -61,14 +61,14 @@ def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heart
     asyncio.run(scene())
     ours, theirs = socket.socketpair()
 
-    async def next_one() -> tuple[int | None, int | None]:
+    async def next_one() -> tuple[tuple[int, ...] | None, ...]:
         lines = GuardianLine(ours, HeartbeatMemory(memory)), GuardianLine(theirs)
-        found = lines[0].left_beat, lines[1].left_beat
+        found = lines[0].left_beats, lines[1].left_beats
         for line in lines:
             line.close()
         return found
 
-    assert asyncio.run(next_one()) == (10, None)
+    assert asyncio.run(next_one()) == (tuple(range(3, 10)), None), "of seven frames"
     os.close(memory)
 
 

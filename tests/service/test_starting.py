@@ -52,7 +52,7 @@ def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
 
 def test_what_a_clean_end_leaves_counts_at_the_next_start_until_the_next_clean_end(tmp_path: Path) -> None:
     """A fault of a program that hung was restarted away, and its next frame pressed."""
-    flag, left = CleanShutdownMarker(tmp_path), {"lost_beats": {"10.0.0.5": 7}, "held_runs": {"10.0.0.6": 32}}
+    flag, left = CleanShutdownMarker(tmp_path), {"lost_beats": {"10.0.0.5": [7]}, "held_runs": {"10.0.0.6": 32}}
     assert flag.left == {}
     flag.clear({**left})
     assert CleanShutdownMarker(tmp_path).left == left and (tmp_path / "left.json").stat().st_mode & 0o777 == 0o600
@@ -70,14 +70,15 @@ def test_what_a_clean_end_leaves_counts_at_the_next_start_until_the_next_clean_e
         ({}, {}),
         ({"zero_n": 1.0, "owner": "10.0.0.5", "recording": None, "lost_beats": {}}, {}),
         (
-            {"held_runs": {"a": 32}, "lost_beats": {"a": 0}, "plant": 3},
-            {"held_runs": {"a": 32}, "lost_beats": {"a": 0}},
+            {"held_runs": {"a": 32}, "lost_beats": {"a": [0]}, "plant": 3},
+            {"held_runs": {"a": 32}, "lost_beats": {"a": [0]}},
         ),
         (
             {"held_runs": {"a": 32.0}, "lost_beats": {"a": True}, "held_enables": {"a": 1.5}},
             {"held_enables": {"a": 1.5}},
         ),
         ({"held_runs": [1], "lost_beats": {"a": None}, "held_enables": "x"}, {}),
+        ({"lost_beats": {"a": [7], "b": [[8]]}}, {}),
     ],
 )
 def test_by_what_nothing_begins_alone_is_left_behind_a_clean_end(kept: dict[str, Any], left: dict[str, Any]) -> None:

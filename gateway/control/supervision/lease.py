@@ -46,6 +46,10 @@ class Lease:
         is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
         return is_new and not self._frames.has_brought(channel, heartbeat)
 
+    def beats_of(self, who: str | None) -> list[int]:
+        """Return the heartbeats that stand in the latest frames of this master."""
+        return self._frames.of(who)
+
     def start(self, now_s: float, who: str = "") -> None:
         """Start the lease at an enable: the master has one length to beat."""
         self._started_s, self._master = now_s, who

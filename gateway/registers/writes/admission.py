@@ -60,7 +60,7 @@ class Write(NamedTuple):
     @property
     def sender(self) -> tuple[str, Channel]:
         """Return who writes, and by which channel."""
-        return self.host, (self.peer.host, self.peer.port, self.address, len(self.data))
+        return self.host, (self.host, self.peer.host, self.peer.port, self.address, len(self.data))
 
 
 class AdmittedWrite(NamedTuple):

@@ -6,11 +6,11 @@ another master's reset alone, too: a reset begins nothing. And a start that was 
 on with the same heartbeat would begin when that reason is over, whatever its other frames bring, as long as they stand still.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from gateway.registers.command import Channel
-from gateway.registers.writes.ownership import FrameBeats, keep_latest
+from gateway.registers.writes.ownership import MOST_FRAMES, FrameBeats, keep_latest
 
 _CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
@@ -109,15 +109,17 @@ class LastTares:
 class HeldEnables:
     """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
     all of them, of other times of the same ones once a second. has_lease: a heartbeat has to change; else none is noted. lost:
-    the heartbeat with which each master was lost in the process before; on_lost: told of all of this one's."""
+    the heartbeats with which each master was lost in the process before, one for each of its frames; on_lost: told of all of
+    this one's; beats_of: what a host's frames bring, as far as control has taken them."""
 
     def __init__(self, *, has_lease: bool = True) -> None:
         self._has_lease = has_lease
         self.on_change: Callable[[dict[str, float]], None] = lambda held: None
-        self.on_lost: Callable[[dict[str, int]], None] = lambda lost: None
+        self.on_lost: Callable[[dict[str, list[int]]], None] = lambda lost: None
+        self.beats_of: Callable[[str | None], Sequence[int]] = lambda host: ()
         self.by_host: dict[str, float] = {}
-        self.lost: dict[str, int] = {}
-        self._lost_now: dict[str, int] = {}
+        self.lost: dict[str, list[int]] = {}
+        self._lost_now: dict[str, list[int]] = {}
         self._frames = FrameBeats()
         self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
@@ -133,10 +135,15 @@ class HeldEnables:
     def note_lost(self, host: str | None, heartbeat: int) -> None:
         """Note that a master is lost, that another one has stopped it, or that the gateway ends: by its last frame, sent on and
         on, the next process would press."""
-        if host is None or not self._has_lease or self._lost_now.get(host) == heartbeat:
-            return
-        keep_latest(self._lost_now, host, heartbeat)
-        self.on_lost(dict(self._lost_now))
+        if host is not None and self._has_lease:
+            self._keep_lost(host, (*self._frames.of(host), *self.beats_of(host), heartbeat))
+
+    def _keep_lost(self, host: str, beats: Sequence[int]) -> None:
+        """Add to the heartbeats with which a host was lost: of a program with several frames each brings its own."""
+        known = self._lost_now.get(host, [])
+        if fresh := [beat for beat in dict.fromkeys(beats) if beat not in known]:
+            keep_latest(self._lost_now, host, [*known, *fresh][-MOST_FRAMES:])
+            self.on_lost(dict(self._lost_now))
 
     def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:
         """Note a write that was refused: the same one, on and on, is of a program that may stand still. standing: the heartbeat
@@ -171,7 +178,7 @@ class HeldEnables:
         """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
         was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
         is over."""
-        if host in self.lost and frame.heartbeat in (None, self.lost[host]):
+        if host in self.lost and (frame.heartbeat is None or frame.heartbeat in self.lost[host]):
             return True
         if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
             return False
@@ -198,7 +205,7 @@ class HeldEnables:
     def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
         is_new = self._frames.note(channel, heartbeat)
-        if is_new and self._lost_now.get(host, heartbeat) != heartbeat:
+        if is_new and host in self._lost_now and heartbeat not in self._lost_now[host]:
             self._find(host)
         if (refused := self._refused.get(host)) is None:
             return
@@ -223,9 +230,9 @@ class HeldEnables:
         if self.by_host.pop(host, None) is not None:
             self.on_change(dict(self.by_host))
 
-    def restore(self, held: Mapping[str, float], lost: Mapping[str, int], now_s: float) -> None:
+    def restore(self, held: Mapping[str, float], lost: Mapping[str, Sequence[int]], now_s: float) -> None:
         """Go on with who was lost, and with what was held in the process before, as long as that can have been a moment ago."""
-        for host, heartbeat in lost.items():
-            self.note_lost(host, heartbeat)
+        for host, beats in lost.items() if self._has_lease else ():
+            self._keep_lost(host, beats)
         self.lost = dict(self._lost_now)
         self.by_host.update((host, now_s) for host, held_s in held.items() if 0.0 <= now_s - held_s < _HELD_S + _DOWN_S)

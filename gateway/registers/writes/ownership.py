@@ -19,6 +19,8 @@ NOT_IPV4: Final = 0xFFFFFFFF
 LARGEST_SERIAL_PLACE: Final = 255
 """Serial faces are shown in owner_ip as 1 to 255: 0.0.0.0/8 holds no address of a host (RFC 1122, 3.2.1.3)."""
 
+MOST_FRAMES: Final = 7
+"""Frames of a program whose heartbeats the next process is told: the memory that they are told in has room for so many."""
 MOST_KNOWN: Final = 64
 """Masters that anything is known of: memory stays bounded whoever writes."""
 
@@ -113,6 +115,10 @@ class FrameBeats:
         is_new = not self.has_brought(channel, heartbeat)
         keep_latest(self._last, channel, heartbeat)
         return is_new
+
+    def of(self, host: str | None) -> list[int]:
+        """Return what the latest frames of a host have brought last."""
+        return [beat for channel, beat in self._last.items() if channel[0] == host][-MOST_FRAMES:]
 
 
 class LastWriters:

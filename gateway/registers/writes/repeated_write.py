@@ -55,7 +55,7 @@ class RepeatedWrite:
         values[_AT_HEARTBEAT] = heartbeat
         values[_AT_NUMBER] += 1
         values[_AT_RECEIVED] = now()
-        values[_AT_CHANNEL] = peer.host, peer.port, self._commands.first, len(data)
+        values[_AT_CHANNEL] = peer.identity, peer.host, peer.port, self._commands.first, len(data)
         command = _new(Command, values)
         if self._admission.decide(_new(ProposedWrite, (command, tuple))):
             return None

@@ -104,8 +104,8 @@ class ControlLoop:
         )
         if lateness := process.lateness:
             self.warnings.held = lambda then_s, now_s: lateness.since(then_s, now_s, waited_s_of(self.processor_time()))
-        bank.on_command = self._on_command
-        bank.on_asked = self._on_asked
+        bank.held_enables.beats_of = controller.beats_of
+        bank.on_command, bank.on_asked = self._on_command, self._on_asked
 
     def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:
         """Before the bank stores a write: whether control can take it at this moment."""
@@ -174,6 +174,11 @@ class ControlLoop:
         self.last_tick.note(now_s, self.processor_time())
         if self._lateness:
             self._lateness.tick(now_s, waited_s_of(self.last_tick.processor_time))
+
+    @property
+    def owner_beats(self) -> list[int]:
+        """Heartbeats that stand in the frames of who owns, that of the last write before them."""
+        return [self.bank.command.heartbeat, *self.controller.beats_of(self.bank.owner)]
 
     @property
     def streamed_s(self) -> float | None:

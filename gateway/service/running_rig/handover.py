@@ -5,13 +5,13 @@ By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
 - a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
-  with the heartbeat with which it was lost, or which it has written before, presses nothing, although fault and loss are
+  with a heartbeat with which it was lost, or which it has written before, presses nothing, although fault and loss are
   forgotten (this alone behind a clean end, too: a service is restarted by who wonders why the machine stands);
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten,
   until the next one: behind a second death it is missing as well.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final
 
 from gateway.registers import RegisterBank
@@ -19,14 +19,18 @@ from gateway.service.running_rig.recording.wanted_recording import WantedRecordi
 
 _LEAST_TOLD_N: Final = 0.05
 _OWN: Final = "the rig's own"
-_HELD: Final = {"held_runs": int, "held_enables": float, "lost_beats": int}
+_HELD: Final[Mapping[str, Callable[[Any], bool]]] = {
+    "held_runs": lambda bits: type(bits) is int,
+    "held_enables": lambda held_s: type(held_s) is float,
+    "lost_beats": lambda beats: type(beats) is list and all(type(beat) is int for beat in beats),
+}
 
 
 def left_of(kept: Mapping[str, Any]) -> dict[str, Any]:
     """Return what of this counts behind a clean end, too: by which bits and heartbeats nothing begins. What is no such fact,
     whatever has become of its file, is left out."""
     facts = {name: kept[name] for name in _HELD if isinstance(kept.get(name), dict) and kept[name]}
-    return {name: held for name, held in facts.items() if all(type(one) is _HELD[name] for one in held.values())}
+    return {name: held for name, held in facts.items() if all(map(_HELD[name], held.values()))}
 
 
 class Handover:
@@ -43,16 +47,16 @@ class Handover:
         return dict(self._kept.get("tls_ports", {}))
 
     def restore_held(
-        self, bank: RegisterBank, now_s: float, keep: Callable[..., None], left_beat: int | None = None
+        self, bank: RegisterBank, now_s: float, keep: Callable[..., None], left_beats: Sequence[int] | None = None
     ) -> None:
         """Let a bank go on with the bits that masters kept at 1, and leave those of its own time to the next process (keep).
-        left_beat: heartbeat of who owned when the process before died; None: nobody knows."""
+        left_beats: heartbeats of who owned when the process before died; None: nobody knows."""
         bank.held_enables.on_lost = lambda lost: keep(lost_beats=lost)
         bank.held_runs.on_change = lambda held: keep(held_runs=held)
         bank.held_enables.on_change = lambda held: keep(held_enables=held)
         bank.held_runs.restore(self._kept.get("held_runs", {}))
         held, lost, owner = (self._kept.get(name) for name in ("held_enables", "lost_beats", "owner"))
-        last = {owner: left_beat} if owner is not None and left_beat is not None else {}
+        last = {owner: left_beats} if owner is not None and left_beats is not None else {}
         keep(owner=None)
         bank.held_enables.restore(held or {}, {**(lost or {}), **last}, now_s)
 

@@ -166,7 +166,7 @@ class RunningRig:
     async def start(self, bind: list[Any] | None, handover: Handover, *, restarted: Ending | None) -> banner.Ready:
         """Open the ports, greet both devices, then serve Modbus: nobody is answered before there is an answer."""
         self._wire(starting.cause_of_restart(restarted, was_unclean=self._shutdown_marker.mark_running()))
-        handover.restore_held(self.bank, time.monotonic(), self._guardian.keep, self._guardian.left_beat)
+        handover.restore_held(self.bank, time.monotonic(), self._guardian.keep, self._guardian.left_beats)
         self.controller.forget_tare(handover.forgotten_zero_n)
         await self._ports.open(is_restart=bool(restarted))
         self._tick.start()
@@ -287,7 +287,7 @@ class RunningRig:
         self._faces.note_tick(expirations / self._rig.loop_hz + late_s + self.loop.last_tick.slept_s)
         self._watchdogs.follow(watchdog_word(self._rig, self._ports, self._line))
         now_s = time.monotonic()
-        self._guardian.heartbeat(now_s, self.bank.owner, self.bank.command.heartbeat)
+        self._guardian.heartbeat(now_s, self.bank.owner, self.loop.owner_beats)
         self._control_socket.live.alarm_times.follow(self.loop.decision)
         self._recordings.flush(now_s)
         self._calibration_runs.flush(now_s)

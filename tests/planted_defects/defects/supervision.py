@@ -53,7 +53,7 @@ DEFECTS = (
            "return is_new and not self._frames.has_brought(channel, heartbeat)", "return is_new",
            ("service/running_rig/masters/test_frames_side_by_side.py",)),
     Defect("a repeated write is of the connection before", "registers/writes/repeated_write.py",
-           "        values[_AT_CHANNEL] = peer.host, peer.port, self._commands.first, len(data)\n", "",
+           "        values[_AT_CHANNEL] = peer.identity, peer.host, peer.port, self._commands.first, len(data)\n", "",
            ("registers/bank/test_repeated_writes.py", "service/running_rig/masters/test_frames_side_by_side.py")),
     Defect("a closed connection is no loss", "control/supervision/lease.py",
            "return not owner_connected or self.age_s(now_s) > self._length_s", "return self.age_s(now_s) > self._length_s",

@@ -27,7 +27,7 @@ def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
         number=1,
         received_s=7.0,
         peer="10.0.0.1",
-        channel=("10.0.0.1", 40000, 0, 4),
+        channel=("10.0.0.1", "10.0.0.1", 40000, 0, 4),
     )
 
 

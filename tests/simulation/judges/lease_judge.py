@@ -40,6 +40,10 @@ class LeaseJudge:
         """Who has taken over, and has not beaten since."""
         self._refused: dict[str, tuple[bytes, float]] = {}
         """Of each master the start, its heartbeat in it, that was refused last, and when."""
+        self._holder = ""
+        """Whose write was the last that left enable at 1."""
+        self._left: dict[Frame, float] = {}
+        """What the frames of the holder brought when control died; nothing once any of them has brought another heartbeat."""
 
     def note_write(self, pdu: bytes, now_s: float, *, is_answered: bool, host: str = "") -> None:
         """A write was taken, or nobody knows whether it was. host: of its master."""
@@ -59,6 +63,7 @@ class LeaseJudge:
             self._took.add(host)
         if control is not None:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
+            self._holder = host if self._is_enabled else ""
         if beat is not None:
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
 
@@ -66,6 +71,7 @@ class LeaseJudge:
         """A request was answered: told before `note_write`. A start that was refused may begin nothing while it stays as it
         was, and none of its master's other frames has brought another heartbeat."""
         control, beat, frame = control_of(pdu), word_of(pdu, BEAT), frame_of(host, pdu)
+        self._judge_left(frame, control, beat, now_s, is_taken=is_taken)
         if beat is not None and self._shown.get(frame) != beat:
             self._shown[frame] = beat
             if self._refused.get(host, (pdu, 0.0))[0] != pdu:
@@ -81,8 +87,23 @@ class LeaseJudge:
             told = f"{host} began by {pdu.hex()}, which was refused {now_s - refused_s:.3f} s before"
             self._observer.complain("I7 repeated start", told, now_s)
 
-    def forget(self) -> None:
-        """Another process does not know what was refused once, nor what each frame brought."""
+    def _judge_left(
+        self, frame: Frame, control: int | None, beat: float | None, now_s: float, *, is_taken: bool
+    ) -> None:
+        """Behind a death the holder's frames begin nothing as they stood, whichever comes first."""
+        left = self._left.get(frame) if beat is not None else None
+        if frame[0] in {host for host, *_ in self._left} and (control == 0 or (beat is not None and beat != left)):
+            self._left.clear()
+        if left is None or left != beat or not is_taken or control is None or not control & ENABLE:
+            return
+        if self._observer.disabled_s is not None and self._observer.bounds.lease_s < inf:
+            self._observer.complain("I7 left frame", f"{frame[0]} began by a frame of before the death", now_s)
+
+    def forget(self, *, is_all: bool = False) -> None:
+        """Another process does not know what was refused once, nor what each frame brought, but for the holder's; is_all: not
+        of those either, for the guardian is another one."""
+        left = {frame: beat for frame, beat in self._brought.items() if frame[0] == self._holder}
+        self._left = {} if is_all else left or self._left
         self._refused.clear()
         self._brought.clear()
         self._shown.clear()

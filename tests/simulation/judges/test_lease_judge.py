@@ -72,3 +72,30 @@ def test_two_frames_that_hang_beside_each_other_renew_no_lease_for_gateway_or_ju
         judge.note_write(frames[tick % 2], 1.0 + 0.1 * tick, is_answered=True, host="10.0.0.1")
         judge.look(1.0 + 0.1 * tick)
     assert [told.partition(" at ")[0] for told in observer.broken][-1] == "I3 heartbeat"
+
+
+@pytest.mark.parametrize("ends", ["dies", "is lost, then dies", "ends"])
+def test_behind_a_restart_no_frame_presses_of_two_that_hang_beside_each_other(ends: str) -> None:
+    late_s = 0.3 if ends == "dies" else 1.0
+    events = [
+        Event(1.0, "worker", "take", (30.0,)),
+        Event(2.5, "worker", "hang", (30000.0,)),
+        Event(2.5 + late_s, "machine", "terminate" if ends == "ends" else "kill", (0.1, 0.0)),
+    ]
+    outcome = run_schedule(90020, events, 7.0)
+    assert outcome.broken == () and outcome.largest_v > 3.0
+
+
+@pytest.mark.parametrize(
+    ("later", "is_seen"),
+    [(FRAME, True), (write_pdu(0, 1, 1200, 0, 0, 8), False), (write_one_pdu(4, 8), False), (write_pdu(0, 0), False)],
+)
+@pytest.mark.parametrize("is_all", [False, True])
+def test_who_begins_by_a_frame_of_before_a_death_is_seen(later: bytes, is_all: bool, is_seen: bool) -> None:
+    observer = Observer(replace(BOUNDS, lease_s=0.2))
+    judge = LeaseJudge(observer)
+    judge.note_write(FRAME, 1.0, is_answered=True, host="10.0.0.1")
+    judge.forget(is_all=is_all)
+    for pdu in (later, FRAME):
+        judge.note_start(pdu, 1.5, is_taken=pdu == FRAME, host="10.0.0.1")
+    assert bool(observer.broken) is (is_seen and not is_all)

@@ -1,5 +1,6 @@
 """Behind the death of a control process: what hangs presses nothing, and what goes on may."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,7 +9,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from gateway.service.running_rig.handover import Handover
+from gateway.service.running_rig.handover import Handover, left_of
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
 from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
@@ -29,7 +30,7 @@ def test_behind_a_crash_the_last_frame_of_a_program_that_hung_presses_not(action
         for _ in range(20):
             rig.answer(0, *frame)
             rig.run(0.1)
-    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert kept["lost_beats"] == {OWNER.host: [7]}
     assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
     assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
     rigs[1].run(3.0).answer(0, *frame[:4], beat, *frame[5:])
@@ -49,7 +50,7 @@ def test_behind_a_crash_the_frames_of_a_hung_program_press_not_whichever_comes_f
             rig.answer(0, ENABLE, 1200)
             rig.answer(4, 7)
             rig.run(0.1)
-    assert kept["lost_beats"] == {OWNER.host: 7}
+    assert kept["lost_beats"] == {OWNER.host: [7]}
     assert max(voltage_v for _, voltage_v, _ in rigs[0].trace) > 1.0
     assert max(voltage_v for _, voltage_v, _ in rigs[1].trace) == 0.0 and rigs[1].state is State.OFF
     rigs[1].write(4, 8)
@@ -79,7 +80,7 @@ def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
     if behind_a_crash:
         rig = handed_over(SmallRig(rig.settings))
     rig.answer(*writes)
-    assert kept["lost_beats"] == ({} if is_found else {OWNER.host: 7})
+    assert kept["lost_beats"] == ({} if is_found else {OWNER.host: [7]})
     refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
     assert (refused is None) is is_found
 
@@ -93,10 +94,10 @@ def test_behind_a_death_the_frames_of_a_program_that_has_just_hung_press_not(act
     kept: dict[str, Any] = {}
     control = settings(lease_s=LEASE_S, lease_action=action)
 
-    def begun(left_beat: int | None) -> SmallRig:
+    def begun(left_beats: list[int] | None) -> SmallRig:
         rig = SmallRig(control)
         hand = Handover(dict(kept), record=False).restore_held
-        hand(rig.bank, rig.now(), lambda **facts: kept.update(facts), left_beat)
+        hand(rig.bank, rig.now(), lambda **facts: kept.update(facts), left_beats)
         rig.beats = False
         return rig
 
@@ -113,8 +114,8 @@ def test_behind_a_death_the_frames_of_a_program_that_has_just_hung_press_not(act
         rig.write(0, 0)
     kept["owner"] = rig.bank.owner  # as the guardian is told
     for _ in range(2 if ends == "dies twice" else 1):
-        rig = begun(rig.bank.command.heartbeat)
-    assert kept["lost_beats"][OTHER.host] == 139 and kept["owner"] is None
+        rig = begun(rig.loop.owner_beats)
+    assert kept["lost_beats"][OTHER.host] == [139] and kept["owner"] is None
     for refused in flow(rig, 2.0):
         assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     assert (rig.state, rig.wire.voltage_v) == (State.OFF, 0.0)
@@ -139,12 +140,12 @@ def test_behind_a_death_a_takeover_counts_no_more_that_was_refused_for_its_heart
         rig.write(0, word, 800, 0, 0, 1)
         refused = rig.answer(0, *frame, peer=OTHER)
         assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
-        assert kept["lost_beats"] == {OTHER.host: 139} and rig.bank.owner == OWNER.host
+        assert kept["lost_beats"] == {OTHER.host: [139]} and rig.bank.owner == OWNER.host
         rig = begun()
 
 
 def test_behind_a_death_a_hung_program_takes_no_force_of_a_living_master_over_by_bit_3_of_its_last_frame() -> None:
-    kept: dict[str, Any] = {"lost_beats": {OTHER.host: 139}}
+    kept: dict[str, Any] = {"lost_beats": {OTHER.host: [139]}}
     rig = SmallRig(settings(lease_s=LEASE_S))
     Handover(kept, record=False).restore_held(rig.bank, rig.now(), lambda **facts: None)
     rig.write(0, ENABLE, 800, 0, 0, 1)
@@ -154,3 +155,44 @@ def test_behind_a_death_a_hung_program_takes_no_force_of_a_living_master_over_by
     assert rig.bank.owner == OWNER.host and rig.plant.force_n == pytest.approx(8.0, abs=0.5)
     rig.write(0, ENABLE | TAKE, *HUNG[1:4], 140, peer=OTHER)
     assert rig.bank.owner == OTHER.host, "its program goes on"
+
+
+@pytest.mark.parametrize("ends", ["lost, then dies", "dies", "ends cleanly"])
+@pytest.mark.parametrize("ports", [(4001, 4001), (4001, 4002)])
+@pytest.mark.parametrize("first", [0, 1])
+def test_behind_a_restart_no_frame_of_several_presses_of_a_program_that_hung(
+    ends: str, ports: tuple[int, int], first: int
+) -> None:
+    """Each of them brings another heartbeat, on and on. The next process knew the last one only: by the other frame 12 N were
+    held until somebody came. A frame of a program that goes on brings a fresh one."""
+    kept: dict[str, Any] = {}
+
+    def begun(left_beats: list[int] | None = None) -> SmallRig:
+        rig = SmallRig(settings(lease_s=LEASE_S, lease_action=LeaseAction.HOLD))
+        hand = Handover(dict(kept), record=False)
+        hand.restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts), left_beats)
+        rig.beats = False
+        return rig
+
+    frames = [((0, ENABLE, 1200, 0, 0, 7), ports[0]), ((0, ENABLE, 1200, 0, 0, 8, 0), ports[1])]
+    rig = begun()
+    for cycle in range(40 if ends.startswith("lost") else 3):
+        for words, port in frames[:: -1 if first and cycle else 1]:
+            rig.answer(*words, peer=replace(OWNER, port=port))
+        rig.run(0.05)
+    assert rig.wire.voltage_v > 1.0
+    left_beats, kept["owner"] = rig.loop.owner_beats, rig.bank.owner
+    if ends.startswith("ends"):
+        rig.bank.held_enables.note_lost(rig.bank.owner, rig.bank.command.heartbeat)
+        kept = left_of(kept)
+    for _ in range(2):
+        rig = begun(None if ends.startswith("ends") else left_beats)
+        for _ in range(40):
+            for words, port in (frames[first], frames[1 - first]):
+                refused = rig.answer(*words, peer=replace(OWNER, port=port))
+                assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+            rig.run(0.05)
+        assert max(voltage_v for _, voltage_v, _ in rig.trace) == 0.0
+        left_beats = rig.loop.owner_beats
+    rig.write(0, ENABLE, 1200, 0, 0, 9, peer=replace(OWNER, port=ports[1]))
+    assert rig.run(0.1).state is not State.OFF, "its program goes on"

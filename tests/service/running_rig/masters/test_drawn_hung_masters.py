@@ -54,26 +54,26 @@ class Cell:
         self.masters = {peer: Master(self.draw) for peer in MASTERS}
         self.begin(None)
 
-    def begin(self, left_beat: int | None) -> None:
+    def begin(self, left_beats: list[int] | None) -> None:
         """Another process of control, with what the one before has left."""
         self.rig = SmallRig(self.control)
         hand = Handover(dict(self.kept), record=False)
-        hand.restore_held(self.rig.bank, self.rig.now(), lambda **facts: self.kept.update(facts), left_beat)
+        hand.restore_held(self.rig.bank, self.rig.now(), lambda **facts: self.kept.update(facts), left_beats)
         self.rig.beats = False
 
     def end(self, *, is_death: bool) -> None:
         bank = self.rig.bank
-        beat = bank.command.heartbeat
+        beats = self.rig.loop.owner_beats
         if is_death:
             self.kept["owner"] = bank.owner
         else:
-            bank.held_enables.note_lost(bank.owner, beat)
+            bank.held_enables.note_lost(bank.owner, beats[0])
             self.kept = left_of(self.kept)
         self.kept.pop("held_enables", None)  # by times of this clock, which begins anew
         for master in self.masters.values():
             if master.hangs and self.rig.state is State.FAULT:
                 master.asks = None  # else that would have been what kept it off
-        self.begin(beat if is_death else None)
+        self.begin(beats if is_death else None)
 
     def happen(self) -> None:
         draw, rig, (peer, master) = self.draw, self.rig, self.draw.choice(tuple(self.masters.items()))

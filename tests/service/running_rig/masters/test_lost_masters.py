@@ -232,7 +232,7 @@ def test_the_masters_that_were_lost_are_sixty_four() -> None:
         for beat in (3, 3, 4):
             held.note_lost(f"10.0.0.{number}", beat)
     held.note_lost(None, 5)
-    assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == 4
+    assert len(told) == 130 and len(told[-1]) == 64 and told[-1]["10.0.0.64"] == [3, 4]
 
 
 @pytest.mark.parametrize("lease_s", [None, LEASE_S])

@@ -227,7 +227,7 @@ def test_who_hung_and_was_taken_over_from_presses_nothing_in_the_next_process() 
     rig.write(0, *frame, peer=HUNG)
     rig.run(0.1).write(0, ENABLE | TAKE, 500, 0, 0, 99, peer=PAGE)
     again = SmallRig(_control(LeaseAction.HOLD)).run(0.5)
-    Handover(kept | {"owner": "web"}, record=False).restore_held(again.bank, again.now(), lambda **facts: None, 99)
+    Handover(kept | {"owner": "web"}, record=False).restore_held(again.bank, again.now(), lambda **facts: None, [99])
     refused = again.answer(0, *frame, peer=HUNG)
     assert refused and refused.reason is STALE and again.state is State.OFF
     assert again.answer(0, *frame[:4], BEAT + 1, peer=HUNG) is None
