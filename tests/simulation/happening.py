@@ -66,8 +66,8 @@ def _command(master: Master, event: Event) -> None:
 def _shake(simulation: "Simulation", event: Event) -> None:
     if event.what == "kill":
         simulation.service.kill_control()
-    elif event.what == "kill_guardian":
-        _kill_guardian(simulation)
+    elif event.what in ("kill_guardian", "power_cut"):
+        _kill_guardian(simulation, is_power_cut=event.what == "power_cut")
     elif event.what == "terminate":
         simulation.service.terminate()
     elif event.what in ("stop", "freeze") and simulation.service.is_guarded:
@@ -106,10 +106,13 @@ def _stop_guardian(simulation: "Simulation", duration_s: float) -> None:
         simulation.observer.control_lost_s = max(simulation.observer.control_lost_s, simulation.service.thaws_s)
 
 
-def _kill_guardian(simulation: "Simulation") -> None:
+def _kill_guardian(simulation: "Simulation", *, is_power_cut: bool) -> None:
     """Control learns of it at once, and ends with the safe voltage. Where it stands still itself that is two faults at a
-    time, for which the device has its watchdog."""
-    if simulation.service.is_serving:
+    time, for which the device has its watchdog, as for a power cut under pressure."""
+    if is_power_cut:
+        if simulation.service.is_serving and simulation.observer.is_safe:
+            simulation.service.cut_power()
+    elif simulation.service.is_serving:
         simulation.service.kill_guardian()
         simulation.observer.history.cuts.append(simulation.clock.now_s)
         simulation.observer.note_disabled(simulation.clock.now_s)

@@ -113,7 +113,8 @@ def draw_refused(seed: int) -> Iterator[Event]:
 
 
 def draw_frames(seed: int) -> Iterator[Event]:
-    """A program hangs that has two frames, each of which brings another heartbeat, on and on; now and then control dies."""
+    """A program hangs that has two frames, each of which brings another heartbeat, on and on; now and then control dies, or all
+    of the gateway, once the master is lost."""
     chance = Random(f"frames {seed}")
     if chance.random() > FRAMES_SHARE:
         return
@@ -121,9 +122,10 @@ def draw_frames(seed: int) -> Iterator[Event]:
     yield _command(chance, round(at_s, 4), whom)
     at_s += chance.uniform(0.05, 4.0)
     yield Event(round(at_s, 4), whom, "hang", (float(chance.randrange(20000, 60000)),))
-    if chance.random() < 0.5:
-        at_s += chance.choice((0.1, 0.3, 1.0)) * chance.uniform(0.5, 1.5)
-        yield Event(round(at_s, 4), "machine", "kill", (0.1, 0.0))
+    dies = chance.choice(("", "", "kill", "kill", "power_cut"))
+    if dies:
+        at_s += chance.choice((0.1, 0.3, 1.0)) * chance.uniform(0.5, 1.5) + (dies == "power_cut")
+        yield Event(round(at_s, 4), "machine", dies, (0.1, 0.0))
 
 
 def _stop(chance: Random, at_s: float) -> Iterator[Event]:

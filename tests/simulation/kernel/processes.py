@@ -218,6 +218,11 @@ class SimulatedService:
                 guardian.control.process.close()
             self._outside.call_later(SERVICE_RESTART_S, self._start)
 
+    def cut_power(self) -> None:
+        """All of it dies at once, without a word; the guardian is started again."""
+        self.kill_control()
+        self.kill_guardian()
+
     def terminate(self) -> None:
         """SIGTERM to the guardian: the force is ramped down first. Somebody starts it again."""
         if self._guardian:
