@@ -110,7 +110,8 @@ def _kill_guardian(simulation: "Simulation", *, is_power_cut: bool) -> None:
     """Control learns of it at once, and ends with the safe voltage. Where it stands still itself that is two faults at a
     time, for which the device has its watchdog, as for a power cut under pressure."""
     if is_power_cut:
-        if simulation.service.is_serving and simulation.observer.is_safe:
+        is_rest = simulation.observer.is_safe and CABLES["output"].through_s <= simulation.clock.now_s
+        if simulation.service.is_serving and is_rest:
             simulation.service.cut_power()
     elif simulation.service.is_serving:
         simulation.service.kill_guardian()

@@ -135,6 +135,7 @@ BLOWS = (
     _machine("kill", 0.1, 0.0),
     _machine("kill", 0.1, 0.0),
     _machine("kill_guardian", 0.1, 0.0),
+    _machine("power_cut", 0.1, 0.0),
     _machine("terminate", 0.1, 0.0),
     _machine("stop", 0.09, 0.0),
     _machine("stop", 0.2, 0.0),

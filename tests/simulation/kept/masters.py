@@ -68,4 +68,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(10.0665, "crowd", "connect", (37.0, 40.0, 0.0)),
         ],
     ),
+    (
+        3130,
+        [
+            Event(5.7924, "worker", "hold", (11.16,)),
+            Event(6.5884, "worker", "hang", (22588.0,)),
+            Event(6.6227, "world", "sim", data=b'{"do": "sim", "set": {"cell.scale": 11.93}}'),
+            Event(6.8268, "machine", "kill", (0.1, 0.0)),
+        ],
+    ),
 ]

@@ -196,3 +196,29 @@ def test_behind_a_restart_no_frame_of_several_presses_of_a_program_that_hung(
         left_beats = rig.loop.owner_beats
     rig.write(0, ENABLE, 1200, 0, 0, 9, peer=replace(OWNER, port=ports[1]))
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("action", LeaseAction)
+def test_behind_a_death_on_the_heels_of_a_fault_no_frame_presses_of_a_program_that_had_hung(
+    action: LeaseAction,
+) -> None:
+    """The fault had taken the output from its master, which was no lost one yet, nor refused one: nobody knew of it."""
+    kept: dict[str, Any] = {}
+
+    def begun() -> SmallRig:
+        rig = SmallRig(settings(lease_s=LEASE_S, lease_action=action))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.beats = False
+        return rig
+
+    rig = begun()
+    rig.write(0, *HUNG)
+    rig.run(0.1).is_cell_silent = True
+    rig.until(State.FAULT)
+    assert rig.now() < 0.6 + LEASE_S and rig.bank.owner is None
+    rig = begun()
+    for _ in range(20):
+        refused = rig.run(0.1).answer(0, *HUNG)
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    rig.write(0, *HUNG[:4], 140)
+    assert rig.run(0.1).state is not State.OFF, "its program goes on"
