@@ -38,11 +38,11 @@ class CleanShutdownMarker:
             return {}
 
     def clear(self, left: dict[str, Any] | None = None) -> None:
-        """Remove the file: this run ended cleanly. left: for the next start."""
+        """Remove the file: this run ended cleanly. left: for the next start; where that is not stored the file stays, for the
+        next start would believe that nobody had hung."""
         with contextlib.suppress(OSError):
             self._left.unlink(missing_ok=True)
             if left:
                 self._left.touch(mode=0o600)
                 self._left.write_text(json.dumps(left), encoding="utf-8")
-        with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)

@@ -285,7 +285,7 @@ class ControlLoop:
             self.calibration_runs.follow(decision)
         if decision.release_owner or (
             decision.clear_command and decision.fault
-        ):  # a fault takes the output from its owner
+        ):  # which takes the output from its owner
             self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)
         if decision.clear_command:
             self.bank.clear_command()
