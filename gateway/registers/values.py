@@ -6,7 +6,7 @@ move. A number that is not available is NaN in float32 and 0x8000 in int16, whic
 
 from array import array
 from enum import StrEnum
-from math import inf, isfinite, isinf, nan
+from math import inf, isfinite, nan
 from struct import Struct
 from typing import Final
 
@@ -61,10 +61,10 @@ def words_swapped_from_little_endian(data: bytes) -> bytes:
 def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
     """Return words of one raw number. ValueError when the type cannot carry it."""
     if kind == "float32":
-        carried = float32(number)
-        if isinf(carried) and abs(number) != inf:
-            raise ValueError(f"{number:g} does not fit in float32")
-        data = _STRUCTS[kind].pack(carried)
+        try:
+            data = _STRUCTS[kind].pack(float(number))
+        except OverflowError:
+            raise ValueError(f"{number:g} does not fit in float32") from None
     else:
         low, high = RAW_LIMITS[kind]
         if number != number and kind == "int16":
