@@ -33,7 +33,7 @@ _NOISE: Final = (
 _BUSY: Final = (
     "our own loop is late (A342), which tears answers, too: end other programs, or `run --realtime`, then look again"
 )
-_NOISY, _SLOW = WarningBit.SERIAL_NOISE.value, WarningBit.SLOW_LOOP.value
+_NOISY, _SLOW = int(WarningBit.SERIAL_NOISE), int(WarningBit.SLOW_LOOP)
 _NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
 
 
@@ -197,7 +197,7 @@ class RateWarnings:
         """Count a tick of the loop, as `SlowLoop.tick` has it, and end what is over."""
         if sentence := self._slow_loop.tick(now_s, expirations, late_s, processor_time):
             self._begin(WarningBit.SLOW_LOOP, sentence)
-        bits = self.bits.value
+        bits = int(self.bits)
         if bits & _NOISY:
             lasts = [line.lasts(now_s) for line in (self._cell, self._output)]
             if not any(lasts):
