@@ -67,7 +67,7 @@ class Cable:
 
     def drop_unsent(self) -> None:
         """Of what the host has written only what is on the wire by now arrives: its driver forgets the rest."""
-        now_s, dropped = self._outside.time(), self._to_device
+        now_s, dropped = self._outside.clock.now_s, self._to_device
         if not dropped.waiting:
             return
         dropped.is_cut, self._to_device = True, Direction()
@@ -82,12 +82,12 @@ class Cable:
     @property
     def backlog_s(self) -> float:
         """Time until the device's last byte is through."""
-        return max(0.0, self._to_host.through_s - self._outside.time())
+        return max(0.0, self._to_host.through_s - self._outside.clock.now_s)
 
     @property
     def through_s(self) -> float:
         """When the host's last byte will have arrived."""
-        return max(self._outside.time(), self._to_device.through_s + 2e-9)
+        return max(self._outside.clock.now_s, self._to_device.through_s + 2e-9)
 
     @property
     def falsified_s(self) -> float:
@@ -109,7 +109,7 @@ class Cable:
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""
         if self.is_deaf:
-            self.on_unheard(self._outside.time())
+            self.on_unheard(self._outside.clock.now_s)
         elif self.is_plugged:  # a host that stood still meanwhile has not noticed yet
             self._put(self._to_device, data, self._arrive)
 
@@ -129,12 +129,12 @@ class Cable:
 
     def say(self, data: bytes) -> None:
         """Bytes that are not as the device said them, or not when: of whatever else is on this wire."""
-        self.strange_s = self._outside.time()
+        self.strange_s = self._outside.clock.now_s
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
 
     def _send_spoiled(self, data: bytes) -> None:
-        self.spoiled_s = self._outside.time()
+        self.spoiled_s = self._outside.clock.now_s
         for late_s, piece in spoiled(self._spoils.popleft(), data):
             self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
@@ -150,7 +150,7 @@ class Cable:
         self.is_plugged = True
 
     def _put(self, direction: Direction, data: bytes, take: Callable[[Direction, bytes], None]) -> None:
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         begin_s = direction.through_s if direction.through_s > now_s else now_s
         room = MOST_QUEUED - int((begin_s - now_s) / self._character_s)
         if len(data) > room:
@@ -169,7 +169,7 @@ class Cable:
             come = min(len(data), int((turn * self.adapter_s - begin_s) / self._character_s))
             if come > sent:
                 direction.waiting.append((begin_s, data[sent:come]))
-                at_s = max(turn * self.adapter_s, self._outside.time()) + 1e-9
+                at_s = max(turn * self.adapter_s, self._outside.clock.now_s) + 1e-9
                 self._outside.call_at(at_s, self._reach_host, direction, data[sent:come])
                 sent = come
             turn += 1
@@ -177,12 +177,12 @@ class Cable:
     def _arrive(self, direction: Direction, data: bytes) -> None:
         direction.waiting.popleft()
         if not direction.is_cut:
-            self.on_device(data, self._outside.time())
+            self.on_device(data, self._outside.clock.now_s)
 
     def _reach_host(self, direction: Direction, data: bytes) -> None:
         direction.waiting.popleft()
         if self.port and not direction.is_cut:
-            self.heard_s = self._outside.time()
+            self.heard_s = self._outside.clock.now_s
             self.on_host(data, self.heard_s)
             self.port.hear(data)
 

@@ -103,14 +103,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def __init__(self, clock: VirtualClock, *, has_tasks: bool = True) -> None:
         super().__init__()
-        self._virtual_clock = clock
+        self.clock = clock
         self.servers: dict[int, Any] = {}
         self.is_halted = False
         self.has_tasks = has_tasks
         self.waiting: list[Handle] = []
 
     def time(self) -> float:
-        return self._virtual_clock.now_s
+        return self.clock.now_s
 
     def halt(self) -> None:
         """Stop as SIGSTOP stops a process, or SIGKILL."""
@@ -119,14 +119,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def go_on(self) -> None:
         """Do what has become due meanwhile, in its order, and go on."""
         self.is_halted = False
-        self._virtual_clock.ready.extend(self.waiting)
+        self.clock.ready.extend(self.waiting)
         self.waiting.clear()
 
     def call_soon(  # type: ignore[override]
         self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
         handle = Handle((0.0, 0, callback, args, self, context))
-        self._virtual_clock.ready.append(handle)
+        self.clock.ready.append(handle)
         return handle
 
     call_soon_threadsafe = call_soon  # type: ignore[assignment]  # there are no threads
@@ -134,7 +134,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def call_later(  # type: ignore[override]
         self, delay: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
-        clock = self._virtual_clock
+        clock = self.clock
         handle = Handle((clock.now_s + delay, next(clock.places), callback, args, self, context))
         heappush(clock.timers, handle)
         return handle
@@ -142,7 +142,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def call_at(  # type: ignore[override]
         self, when: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
-        clock = self._virtual_clock
+        clock = self.clock
         handle = Handle((when, next(clock.places), callback, args, self, context))
         heappush(clock.timers, handle)
         return handle
