@@ -80,9 +80,12 @@ class _Scale(NamedTuple):
 
     def count(self, number: float) -> int:
         """What the register shows of any number, also of one that it does not carry."""
+        count = number * self.counts_per_unit
+        if self.low <= count <= self.high:
+            return round(count)
         if not isfinite(number):
             return self.unavailable
-        return round(min(max(number * self.counts_per_unit, self.low), self.high))
+        return self.high if count > self.high else self.low
 
 
 class _Run(NamedTuple):
