@@ -152,9 +152,7 @@ class Cable:
     def _put(self, direction: Direction, data: bytes, take: Callable[[Direction, bytes], None]) -> None:
         now_s = self._outside.clock.now_s
         begin_s = direction.through_s if direction.through_s > now_s else now_s
-        room = MOST_QUEUED - int((begin_s - now_s) / self._character_s)
-        if len(data) > room:
-            data = data[: max(0, room)]
+        data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
         if data and self.adapter_s and direction is self._to_host:
             self._put_in_pieces(direction, data, begin_s)
         elif data:
