@@ -57,7 +57,7 @@ class LineSplitter:
         """Return the lines that these bytes complete; an unfinished one waits."""
         self._buffer += chunk
         lines = []
-        while (line := self._next()) is not None:
+        while self._buffer and (line := self._next()) is not None:
             lines.append(line)
         return lines
 

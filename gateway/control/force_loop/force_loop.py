@@ -188,14 +188,13 @@ class ForceLoop:
     def elapse(self, dt_s: float, line: LineStatus) -> None:
         """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
         hears what the wire has really taken, where that is known: it carries one setting at a time."""
-        voltage_v = self._limiter.voltage_v
         self._limiter.earn(dt_s)
-        self._lead.advance(voltage_v if line.sent_v is None else line.sent_v, dt_s)
+        self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
         if isinstance(self._lead, LinearizedLagInverse):
             self._lead.set_wire_time(line.wire_s)
             self._coming.elapse(self._lead, dt_s)
-        self.expected.advance(voltage_v, dt_s)
-        self.left.advance(voltage_v, line, dt_s)
+        self.expected.advance(self._limiter.voltage_v, dt_s)
+        self.left.advance(self._limiter.voltage_v, line, dt_s)
 
     def rest(self) -> None:
         """Go to the safe voltage at once and forget everything learned: disabled."""
