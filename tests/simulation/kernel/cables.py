@@ -51,6 +51,7 @@ class Cable:
         self.strange_s = 0.0  # when something strange was said last
         self.on_dropped: Callable[[bytes], None] = lambda sent: None  # of a message whose rest its host has forgotten
         self.spoiled_s = -inf  # when an answer of the device was spoiled last
+        self.falsified_s = 0.0  # when its host has heard last what the device has not said, or not so
         self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
         self.on_host: Callable[[bytes, float], None] = lambda chunk, now_s: None  # what the host has got
@@ -89,17 +90,10 @@ class Cable:
         """When the host's last byte will have arrived."""
         return max(self._outside.clock.now_s, self._to_device.through_s + 2e-9)
 
-    @property
-    def falsified_s(self) -> float:
-        """When its host has heard last what the device has not said, or not so."""
-        return max(self.strange_s, self.spoiled_s)
-
     def is_disturbed(self, now_s: float) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
-        strange_since_s = now_s - STRANGE_S
         return bool(
-            self.strange_s > strange_since_s
-            or self.spoiled_s > strange_since_s
+            self.falsified_s > now_s - STRANGE_S
             or self._spoils
             or not self.is_plugged
             or self.is_deaf
@@ -129,12 +123,12 @@ class Cable:
 
     def say(self, data: bytes) -> None:
         """Bytes that are not as the device said them, or not when: of whatever else is on this wire."""
-        self.strange_s = self._outside.clock.now_s
+        self.strange_s = self.falsified_s = self._outside.clock.now_s
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
 
     def _send_spoiled(self, data: bytes) -> None:
-        self.spoiled_s = self._outside.clock.now_s
+        self.spoiled_s = self.falsified_s = self._outside.clock.now_s
         for late_s, piece in spoiled(self._spoils.popleft(), data):
             self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
