@@ -39,7 +39,8 @@ _UNITS: Final = {
 }  # fmt: skip
 _NO_VALUES: Final = (RefusalReason.QUANTITY, RefusalReason.UNIT)  # theirs is a count, or an id
 _AT_ONCE_VALUE, _AT_ONCE_EDGE, _AT_ONCE_REFUSAL = 1, 20, 5
-_FALLS: Final = {ControlBit.ENABLE: "disable", ControlBit.START_CALIBRATION: "stop_calibration"}
+_BITS: Final = tuple((int(bit), str(bit.name).lower()) for bit in ControlBit)
+_FALLS: Final = {"enable": "disable", "start_calibration": "stop_calibration"}
 
 
 Owners = tuple[str | None, str | None]
@@ -118,11 +119,11 @@ class WriteAudit:
     def _note_edges(self, peer: Peer, edges: int, admitted: AdmittedWrite, states: _States) -> None:
         rises, falls = (admitted.kept & ~states.word) | edges, states.word & ~admitted.kept
         told = []
-        for bit in ControlBit if rises | falls else ():
+        for bit, name in _BITS:
             if rises & bit:
-                told.append(self._count(peer, str(bit.name).lower(), _AT_ONCE_EDGE, (0.0, 1.0)))
+                told.append(self._count(peer, name, _AT_ONCE_EDGE, (0.0, 1.0)))
             elif falls & bit:
-                told.append(self._count(peer, _FALLS.get(bit, str(bit.name).lower()), _AT_ONCE_EDGE, (1.0, 0.0)))
+                told.append(self._count(peer, _FALLS.get(name, name), _AT_ONCE_EDGE, (1.0, 0.0)))
         if admitted.is_stop and not falls:
             told.append(self._count(peer, "stop", _AT_ONCE_EDGE, (0.0, 0.0)))
         if states.owner != states.owner_after:

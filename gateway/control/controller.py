@@ -147,7 +147,7 @@ class Controller:
         """Decide whether nothing about a command has to be asked. Most writes are so: a setpoint, a heartbeat."""
         if not self._machine.takes_any_setpoint:
             return False
-        asks_pull = self._valve is not None and proposal.command.control_word & _PULL
+        asks_pull = self._valve is not None and int(proposal.command.control_word) & _PULL
         return not asks_pull and not self._commands.edges_of(proposal.command).rises
 
     def refusal_of_run(self, now_s: float, plan: AnyPlan) -> str:

@@ -71,7 +71,7 @@ class OutputComposer:
             loop.trim_v,
             loop.limited_by,
             state,
-            self._status(touching, is_ready=not block, is_warning=bool(warnings)),
+            self._status(touching, warnings, is_ready=not block),
             machine.fault,
             _warning_word(warnings),
             force_measured_n=self._as_read(reading.contact_n) if believed else nan,
@@ -105,7 +105,7 @@ class OutputComposer:
             return 0.0
         return run.target_n or (0.0 if machine.is_ramping_down else machine.hold(self._parts.commands.demand).force_n)
 
-    def _status(self, touching: bool, *, is_ready: bool, is_warning: bool) -> StatusBit:
+    def _status(self, touching: bool, warnings: int, *, is_ready: bool) -> StatusBit:
         machine, loop = self._machine, self._parts.loop
         return _STATUS_WORDS[
             (_ENABLED if machine.is_enabled else 0)
@@ -113,9 +113,9 @@ class OutputComposer:
             | (_CONTACT if touching else 0)
             | (_IN_BAND if loop.in_band else 0)
             | (_FAULT if machine.state is _IN_FAULT else 0)
-            | (_WARNING if is_warning else 0)
+            | (_WARNING if warnings else 0)
             | (_LIMITED if loop.limited_by is not _NOT_LIMITED else 0)
-            | (_UNREACHABLE if loop.unreachable else 0)
+            | (_UNREACHABLE if warnings & _TARGET_UNREACHABLE else 0)
             | (_PULLING if self._valve and self._valve.is_pulling else 0)
             | (_SWITCHING if self._valve and self._valve.is_switching else 0)
         ]

@@ -27,6 +27,7 @@ from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 
 _ENABLE, _RESET, _TARE = int(ControlBit.ENABLE), int(ControlBit.RESET_FAULT), int(ControlBit.TARE)
 _TAKE = int(ControlBit.TAKE_OWNERSHIP)
+_PLANS: Final = ((int(ControlBit.START_CALIBRATION), CalibrationPlan), (int(ControlBit.START_SELF_TEST), SelfTestPlan))
 _WHOLE: Final = ControlBit(0)
 _ROUNDED_N: Final = 1e-3  # what is held, as a register says it, may be a bit more
 _PUSHING: Final = (
@@ -132,7 +133,7 @@ class EdgeCheck:
             yield from _some(self._tare(command, state, at))
         if edges.rises & _ENABLE and state not in ENABLED_STATES:
             yield from _some(_refuse_blocked(_in(state, at), ControlBit.ENABLE) or self._repeated(command, at))
-        plans = [plan for plan in (CalibrationPlan(), SelfTestPlan()) if edges.rises & _bit_of(plan)]
+        plans = [plan() for bit, plan in _PLANS if edges.rises & bit]
         for plan in plans:
             if self._valve is not None and command.control_word & ControlBit.VALVE_PULL:  # it would turn under the run
                 yield _no_run(_reason_of(plan), f"valve_pull is 1, {_PUSHING}", plan)

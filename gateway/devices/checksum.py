@@ -55,6 +55,9 @@ _TRAILERS: Final[dict[ChecksumName, Callable[[bytes], bytes]]] = {
 }
 
 
+_LENGTHS: Final = {name: len(trailer(b"")) for name, trailer in _TRAILERS.items()}
+
+
 def add_checksum(body: bytes, name: ChecksumName) -> bytes:
     """Return the sentence with its checksum behind it."""
     return body + _TRAILERS[name](body)
@@ -62,6 +65,5 @@ def add_checksum(body: bytes, name: ChecksumName) -> bytes:
 
 def strip_checksum(sentence: bytes, name: ChecksumName) -> bytes | None:
     """Return the sentence without its checksum, None when that is missing or wrong."""
-    length = len(_TRAILERS[name](b""))
-    body = sentence[: len(sentence) - length]
+    body = sentence[: len(sentence) - _LENGTHS[name]]
     return body if add_checksum(body, name) == sentence else None

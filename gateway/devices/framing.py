@@ -35,6 +35,7 @@ class LineSplitter:
 
     def __init__(self, terminator: bytes) -> None:
         self._terminator = terminator
+        self._window = LONGEST_LINE_BYTES + len(terminator)
         self._buffer = b""
         self._is_skipping = False
 
@@ -56,18 +57,17 @@ class LineSplitter:
         """Return the lines that these bytes complete; an unfinished one waits."""
         self._buffer += chunk
         lines = []
-        while (line := self._next()) is not None:
+        while self._buffer and (line := self._next()) is not None:
             lines.append(line)
         return lines
 
     def _next(self) -> Line | None:
-        window = LONGEST_LINE_BYTES + len(self._terminator)
-        end = self._buffer.find(self._terminator, 0, window)
+        end = self._buffer.find(self._terminator, 0, self._window)
         if end >= 0:
             data = self._take(end + len(self._terminator))
             was_skipping, self._is_skipping = self._is_skipping, False
             return Line(data, data[:end], not was_skipping)
-        if len(self._buffer) < window:
+        if len(self._buffer) < self._window:
             return None
         self._is_skipping = True
         data = self._take(LONGEST_LINE_BYTES)

@@ -175,7 +175,8 @@ class Grammar:
         """Return the field values, None unless body is this sentence with this profile's constants.
         A sentence with another address belongs to another device."""
         values = compile_template(template).decode(body, may_be_blank) if body is not None and template else None
-        if values is None or any(values.get(name, fixed) != fixed for name, fixed in self.profile.constants.items()):
+        constants = self.profile.constants
+        if values and constants and any(values.get(name, fixed) != fixed for name, fixed in constants.items()):
             return None
         return values
 

@@ -29,7 +29,7 @@ from gateway.fieldbus.rate_limits import LATE_S, Backlog, LogLimiter, RequestRat
 from gateway.fieldbus.settings import ServerSettings
 from gateway.fieldbus.socket_transport import READ_BYTES
 from gateway.fieldbus.waiting_bytes import count_waiting
-from gateway.modbus.fast import READ_FRAME_BYTES, TRANSACTION_BYTES, whole_answer, whole_read_answer
+from gateway.modbus.fast import whole_answer
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
 from gateway.modbus.peer import Peer
 from gateway.modbus.server import DataBank, answer, refuse_unit
@@ -131,34 +131,38 @@ class Connection(asyncio.Protocol):
         shared.connections.add(self)
         self._rate = shared.peers.rate(self.peer.host, now_s)
         is_plain = self._transport.get_extra_info("modbus_taken") is None  # of TLS one whole frame may be one of a pile
-        self._fast_units = frozenset(shared.settings.units if self._rate is None and is_plain else ())
+        self._is_unlimited = self._rate is None and is_plain
+        self._units = frozenset(shared.settings.units)
         self._peer_behind = replace(self.peer, is_behind=True)
-        self._known_answers = shared.bank.known_answers if self._fast_units else {}
         self._transport.set_write_buffer_limits(high=shared.settings.write_buffer_bytes)
 
     def data_received(self, data: bytes) -> None:
         """Answer what has come, READ_BYTES at most: the one call per request."""
-        if self._partial_since_s is None:
-            frame = None
-            if len(data) == READ_FRAME_BYTES:
-                known = self._known_answers.get(data[TRANSACTION_BYTES:])
-                if known is not None:
-                    frame = data[:TRANSACTION_BYTES] + known
-                else:
-                    frame = whole_read_answer(data, self._fast_units, self._shared.bank, self.peer)
-            if frame is None:
-                frame = whole_answer(data, self._fast_units, self._shared.bank, self.peer)
-            if frame is not None:
-                self._write(frame)
-                self._answered = True
-                return
+        if self._is_unlimited and self._partial_since_s is None and self._answer_whole(data):
+            return
         self._receive(data)
 
+    def _answer_whole(self, data: bytes) -> bool:
+        """Answer exactly one whole frame; False where it is anything else."""
+        try:
+            frame = whole_answer(data, self._units, self._shared.bank, self.peer)
+        except BaseException:
+            self._transport.abort()
+            raise
+        if frame is not None:
+            self._write(frame)
+            self._answered = True
+        return frame is not None
+
     def _receive(self, data: bytes) -> None:
-        """Whatever is not exactly one frame from an unlimited peer."""
+        """Whatever is not exactly one frame from an unlimited peer; most often one from a peer whose rate allows it."""
         if self._is_closing:
             return
         self._note_backlog(len(data))
+        rate, waits = self._rate, len(self._framer) or self._backlog.is_late
+        if rate and not waits and not rate.wait_s(self._read_s) and self._answer_whole(data):
+            rate.spend()
+            return
         self._framer.push(data)
         self._answer_complete_requests()
         if len(data) == READ_BYTES and not (self._is_paused or self._is_closing):
@@ -201,11 +205,11 @@ class Connection(asyncio.Protocol):
         if self._rate is not None and not self._has_place:
             self._rate.spend()
         self._has_place = False
-        shared = self._shared
-        if request.unit in shared.settings.units:
-            pdu = answer(request.pdu, shared.bank, self._peer_behind if self._backlog.is_late else self.peer)
+        bank, units = self._shared.bank, self._shared.settings.units
+        if request.unit in units:
+            pdu = answer(request.pdu, bank, self._peer_behind if self._backlog.is_late else self.peer)
         else:
-            pdu = refuse_unit((request.unit, request.pdu), shared.settings.units, shared.bank, self.peer)
+            pdu = refuse_unit((request.unit, request.pdu), units, bank, self.peer)
         return encode(Adu(request.transaction, request.unit, pdu))
 
     def _note_backlog(self, size: int) -> None:
@@ -302,7 +306,7 @@ class Connection(asyncio.Protocol):
 
     def _stop(self) -> None:
         self._closing_since_s = self._shared.clock.time()
-        self._fast_units, self._known_answers = frozenset(), {}
+        self._units = frozenset()
         if self._rate is not None and self._has_place:
             self._rate.give_back()
         self._has_place = False

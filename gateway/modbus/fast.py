@@ -17,6 +17,7 @@ from gateway.modbus.server import DataBank, answer
 
 READ_FRAME_BYTES: Final = 12
 TRANSACTION_BYTES: Final = 2  # at the start of each frame: of an answer, those of its request
+_UNIT_AT: Final = 6
 _MOST_KNOWN: Final = 64  # memory stays bounded whoever reads what
 _FRAME: Final = Struct(">HHHBBHH")  # transaction, protocol, length, unit, function, address, count
 _WRITE: Final = Struct(">HHHBBHHB")  # the same of FC16, and the bytes that follow
@@ -56,6 +57,11 @@ def whole_read_answer(
 def whole_answer(data: bytes, units: Container[int], bank: DataBank, peer: Peer) -> bytes | None:
     """Return the answer to these bytes; None when they are not one whole frame for a served unit."""
     size = len(data)
+    if size == READ_FRAME_BYTES:
+        if (known := bank.known_answers.get(data[TRANSACTION_BYTES:])) is not None and data[_UNIT_AT] in units:
+            return data[:TRANSACTION_BYTES] + known
+        if (read := whole_read_answer(data, units, bank, peer)) is not None:
+            return read
     if size > _WRITE.size and data[7] == WRITE_REGISTERS:
         transaction, protocol, length, unit, function, address, count, data_bytes = _unpack_write(data)
         is_whole = not protocol and length + 6 == size and unit in units

@@ -39,6 +39,7 @@ FORK: Final = (
 
 _LARGEST: Final = 65536
 _MOST_DESCRIPTORS: Final = 4
+_CUT_OFF: Final = int(socket.MSG_TRUNC | socket.MSG_CTRUNC)
 _FLAGS: Final = socket.MSG_DONTWAIT | getattr(socket, "MSG_CMSG_CLOEXEC", 0)  # a port's lock is no child's inheritance
 
 
@@ -106,7 +107,7 @@ def _receive_raw(link: socket.socket) -> tuple[bytes, list[tuple[int, int, bytes
 
 
 def _body(data: bytes, flags: int) -> dict[str, Any]:
-    if flags & (socket.MSG_TRUNC | socket.MSG_CTRUNC):
+    if flags & _CUT_OFF:
         raise ProtocolError(f"a message of {chr(data[0])!r} lost its end")
     if len(data) == 1:
         return {}

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from math import isfinite
 from operator import attrgetter, mul
 from struct import Struct
+from struct import error as PackError  # noqa: N812
 from typing import Final, NamedTuple
 
 from gateway.modbus import Peer
@@ -65,8 +66,6 @@ _UNITS_PER_SI: Final = {
     "kPa": 1.0e-3,
     "permille": 1.0e3,
 }
-_BEYOND: Final = -1
-"""In place of a count: the register does not carry the number."""
 BANK_REGISTERS: Final = ("owner_ip", "refusal_address", "refusal_reason", "refusal_value")
 
 
@@ -79,11 +78,14 @@ class _Scale(NamedTuple):
     high: int
     unavailable: int
 
-    def count_beyond(self, number: float) -> int:
-        """What the register shows of a number that it does not carry."""
+    def count(self, number: float) -> int:
+        """What the register shows of any number, also of one that it does not carry."""
+        count = number * self.counts_per_unit
+        if self.low <= count <= self.high:
+            return round(count)
         if not isfinite(number):
-            return self.unavailable & 0xFFFF
-        return (self.high if number * self.counts_per_unit > self.high else self.low) & 0xFFFF
+            return self.unavailable
+        return self.high if count > self.high else self.low
 
 
 class _Run(NamedTuple):
@@ -115,7 +117,6 @@ class StatusBlock:
         self._scales = tuple(_scale(register) for register in published)
         self._units_per_si = tuple(scale.units_per_si for scale in self._scales)
         self._counts_per_unit = tuple(scale.counts_per_unit for scale in self._scales)
-        self._limits = tuple((scale.low, scale.high) for scale in self._scales)
         self._runs = tuple(_runs(register_map, published))
         self._own = {name: _faces(register_map, name) for name in BANK_REGISTERS}
         self._shown_owner: tuple[str | None, str] | None = None
@@ -124,16 +125,14 @@ class StatusBlock:
     def publish(self, status: Status) -> None:
         """Write everything that control and service know into all three faces."""
         numbers = list(map(mul, self._fields(status), self._units_per_si))
-        counts = [
-            round(count) & 0xFFFF if low <= count <= high else _BEYOND
-            for count, (low, high) in zip(map(mul, numbers, self._counts_per_unit), self._limits, strict=True)
-        ]
-        if _BEYOND in counts:
-            for place, scale in enumerate(self._scales):
-                if counts[place] == _BEYOND:
-                    counts[place] = scale.count_beyond(numbers[place])
-                    numbers[place] = carried_by_float32(numbers[place])
-        self._pack(counts, numbers)
+        try:
+            counts = list(map(round, map(mul, numbers, self._counts_per_unit)))
+            if UNAVAILABLE_INT16 in counts:
+                raise OverflowError
+            self._pack(counts, numbers)
+        except (ValueError, OverflowError, PackError):  # one is no number, or more than its register carries
+            counts = [scale.count(number) for scale, number in zip(self._scales, numbers, strict=True)]
+            self._pack(counts, [carried_by_float32(number) for number in numbers])
 
     def _pack(self, counts: Sequence[int], numbers: Sequence[float]) -> None:
         data = self._image.data
@@ -192,6 +191,7 @@ def _runs(register_map: RegisterMap, published: Sequence[Register]) -> list[_Run
     for start, stop in zip(breaks, [*breaks[1:], len(published)], strict=True):
         count, offset = stop - start, published[start].address - first
         high, low = (2 * (bases[order] + 2 * offset) for order in (WordOrder.ABCD, WordOrder.CDAB))
-        words, floats, little = Struct(f">{count}H"), Struct(f">{count}f"), Struct(f"<{count}f")
+        letters = ("h" if register.type == "int16" else "H" for register in published[start:stop])
+        words, floats, little = Struct(f">{''.join(letters)}"), Struct(f">{count}f"), Struct(f"<{count}f")
         runs.append(_Run(start, stop, words, 2 * published[start].address, floats, high, little, low))
     return runs

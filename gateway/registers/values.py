@@ -6,7 +6,7 @@ move. A number that is not available is NaN in float32 and 0x8000 in int16, whic
 
 from array import array
 from enum import StrEnum
-from math import inf, isfinite, isinf, nan
+from math import copysign, inf, isfinite, nan
 from struct import Struct
 from typing import Final
 
@@ -61,10 +61,10 @@ def words_swapped_from_little_endian(data: bytes) -> bytes:
 def pack_number(kind: str, order: WordOrder, number: float) -> bytes:
     """Return words of one raw number. ValueError when the type cannot carry it."""
     if kind == "float32":
-        carried = float32(number)
-        if isinf(carried) and abs(number) != inf:
-            raise ValueError(f"{number:g} does not fit in float32")
-        data = _STRUCTS[kind].pack(carried)
+        try:
+            data = _STRUCTS[kind].pack(float(number))
+        except OverflowError:
+            raise ValueError(f"{number:g} does not fit in float32") from None
     else:
         low, high = RAW_LIMITS[kind]
         if number != number and kind == "int16":
@@ -100,4 +100,6 @@ def decimal(number: float) -> float:
 
 def carried_by_float32(number: float) -> float:
     """Return what a float register may show: NaN for anything not finite, clamped to what float32 carries."""
-    return max(-LARGEST_FLOAT32, min(LARGEST_FLOAT32, number)) if isfinite(number) else nan
+    if -LARGEST_FLOAT32 <= number <= LARGEST_FLOAT32:
+        return number
+    return copysign(LARGEST_FLOAT32, number) if isfinite(number) else nan

@@ -90,10 +90,12 @@ class Twin:
 
     def advance(self, dt_s: float) -> None:
         """Let time pass. Parts of a step are kept for the next call, so that only the sum counts."""
-        if not 0.0 <= dt_s < float("inf"):
+        if not 0.0 <= dt_s < math.inf:
             raise ValueError(f"time advances by a finite dt_s >= 0, not by {dt_s}")
         self._owed_steps += dt_s / STEP_S
         steps = int(self._owed_steps + _ROUNDING)
+        if not steps:
+            return
         self._owed_steps -= steps
         regulator, slide, cell = self._regulator.step, self._slide.step, self._cell.step
         if self._contact.is_on:
@@ -102,8 +104,7 @@ class Twin:
             for _ in range(steps):
                 cell(slide(regulator()))
         self._steps += steps
-        if steps:
-            self._reading = None
+        self._reading = None
 
     def _advance_contact(self, steps: int) -> None:
         """The same with effects of contact and tool, which look at the time and at the surroundings."""

@@ -91,6 +91,18 @@ def test_who_is_counted_is_counted_for_what_is_known_as_well(stand: Any, deliver
     assert far.written == framed(READ_ANSWER, 0) and not far.reading
 
 
+@pytest.mark.parametrize("host", ["127.0.0.1", "192.0.2.7"])
+def test_the_rest_of_a_request_that_looks_like_a_whole_one_is_none(host: str, stand: Any, deliver: Any) -> None:
+    made = stand()
+    connection, far = made.connect(host)
+    deliver(connection, far, framed(READ))
+    far.written.clear()
+    request = framed(pdu.write_registers_request(10, framed(READ)), 1)
+    deliver(connection, far, request[: -len(framed(READ))])
+    deliver(connection, far, framed(READ))
+    assert far.written == framed(pack(">BHH", 16, 10, len(framed(READ)) // 2), 1)
+
+
 def test_what_is_known_is_no_answer_behind_the_end_of_a_connection(stand: Any, deliver: Any) -> None:
     made = stand()
     connection, far = made.connect(stuck=True)

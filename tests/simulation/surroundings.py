@@ -44,7 +44,7 @@ class Surroundings:
             rig,
             send_output=lambda data: CABLES["output"].send_to_host(data),
             send_cell=lambda data: CABLES["load_cell"].send_to_host(data),
-            now_s=outside.time(),
+            now_s=outside.clock.now_s,
         )
         self._move_valve, self.world.valve.move = self.world.valve.move, self._judge_valve  # type: ignore[method-assign]
         lay_cables(outside, rig, self._on_output, self.world.on_cell_bytes, self._on_valve)
@@ -77,7 +77,7 @@ class Surroundings:
 
     def lose_power(self, dark_s: float, power_on_v: float) -> None:
         """The output device alone goes dark, and comes back as one that has just been switched on."""
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         self.world.advance(now_s)
         self.world._output = output_device(self._rig.output.device)
         self._dark_until_s = now_s + dark_s
@@ -94,14 +94,14 @@ class Surroundings:
         CABLES[line].pull()
         self._pulled.add(line)
         if line == "output":
-            now_s = self._outside.time()
+            now_s = self._outside.clock.now_s
             self._observer.note_cut(now_s)
             self._observer.output_lost_s, self._back_s = now_s, 0.0
         self._judge()
 
     def deafen(self, *, on: bool) -> None:
         """Break the wire on which the output hears, or mend it: it stays where it is, and answers nothing."""
-        cable, now_s = CABLES["output"], self._outside.time()
+        cable, now_s = CABLES["output"], self._outside.clock.now_s
         if on and not cable.is_deaf:
             cable.cut()
             self._observer.note_cut(now_s)
@@ -124,7 +124,7 @@ class Surroundings:
 
     def _judge(self) -> None:
         """Whether cell and output can be heard now, and since when they cannot."""
-        now_s, observer, settings = self._outside.time(), self._observer, self.world.settings
+        now_s, observer, settings = self._outside.clock.now_s, self._observer, self.world.settings
         is_cell_lost = settings.is_on("cell.silent") or not CABLES["load_cell"].is_plugged
         observer.cell_lost_s = _since(observer.cell_lost_s, is_cell_lost, now_s)
         is_silent = settings.is_on("output.silent") or now_s < self._dark_until_s
@@ -138,7 +138,7 @@ class Surroundings:
         observer, output, cell = self._observer, CABLES["output"], CABLES["load_cell"]
         observer.cell_heard_s = observer.cell_said_s if observer.history.is_plain else cell.heard_s
         is_noisy = self.world.settings.number("wire.noise") > 0.0
-        observer.answer_spoiled_s = self._outside.time() if is_noisy else output.spoiled_s
+        observer.answer_spoiled_s = self._outside.clock.now_s if is_noisy else output.spoiled_s
         if observer.cell_lost_s is not None:
             observer.cell_lost_s = max(observer.cell_lost_s, cell.strange_s)
         if observer.answers_lost_s is not None:
@@ -152,7 +152,7 @@ class Surroundings:
         if not is_off or self._observer.is_safe or self._observer.output_lost_s is not None:
             self._unwatched_s = None
             return
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         if self._unwatched_s is None:
             self._unwatched_s = now_s
         if now_s - self._unwatched_s > UNWATCHED_S:
@@ -169,7 +169,7 @@ class Surroundings:
 
     def tell_reasons(self, reasons: ReasonJudge) -> None:
         """Say what is disturbed now."""
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         disturbed = [line for line, cable in CABLES.items() if cable.is_disturbed(now_s)]
         is_slow, is_dark = self.cell_pace != 1.0, now_s < self._dark_until_s + NOTICED_S
         self.is_whole = not (disturbed or is_slow or is_dark)
@@ -201,7 +201,7 @@ class Surroundings:
     def _stream(self) -> None:
         assert self._cell_s
         if CABLES["load_cell"].backlog_s < 0.01:
-            self.world.stream(self._outside.time())
+            self.world.stream(self._outside.clock.now_s)
         self._outside.call_later(self.cell_pace * self._cell_s, self._stream)
 
 

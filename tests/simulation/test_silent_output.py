@@ -109,7 +109,7 @@ def test_what_is_left_of_a_dropped_sentence_may_stand_before_the_next_one_and_no
     def complains(data: bytes, for_s: float = 1.0) -> bool:
         before = len(observer.broken)
         cable.send_to_device(data)
-        outside._virtual_clock.run_until(outside.time() + for_s)
+        outside.clock.run_until(outside.time() + for_s)
         return len(observer.broken) > before
 
     assert not complains(next_one), "the first may stand behind anything"

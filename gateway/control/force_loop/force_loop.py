@@ -193,8 +193,8 @@ class ForceLoop:
         if isinstance(self._lead, LinearizedLagInverse):
             self._lead.set_wire_time(line.wire_s)
             self._coming.elapse(self._lead, dt_s)
-        self.expected.advance(self.voltage_v, dt_s)
-        self.left.advance(self.voltage_v, line, dt_s)
+        self.expected.advance(self._limiter.voltage_v, dt_s)
+        self.left.advance(self._limiter.voltage_v, line, dt_s)
 
     def rest(self) -> None:
         """Go to the safe voltage at once and forget everything learned: disabled."""

@@ -37,6 +37,9 @@ class LeapLimit:
 
     def take(self, force_n: float) -> float:
         """Return as much of this reading as is believed, N."""
+        if self._low_n <= force_n <= self._high_n:  # most are no leap
+            self._low_n, self._high_n = force_n - LEAP_N, force_n + LEAP_N
+            return force_n
         believed_n = max(self._low_n, min(self._high_n, force_n))
         self._low_n, self._high_n = min(force_n, believed_n) - LEAP_N, max(force_n, believed_n) + LEAP_N
         return believed_n

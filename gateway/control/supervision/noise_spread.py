@@ -10,6 +10,7 @@ WINDOW: Final = 32
 EXPECTED_ERROR: Final = 0.1  # of a noise that a calibration has measured: 50 readings; the cell may have changed since
 STILL_COUNTS: Final = 0.5  # between the halves of a window: more is a force that moves
 _CAREFUL: Final = 0.3  # of the harmonic's size: how unsure a spread is below 0.4 counts
+_HARMONIC, _DAMPING = 1.0 / pi**2, -2.0 * pi**2  # of the first harmonic of the rounding, by noise in counts
 _CONTRADICTION: Final = 1.5  # standard errors of the variance, by which neighbours differ by less: the force drifted
 _CLEARLY: Final = 2.0  # standard errors by which so few samples are outside two counts
 _SURELY: Final = 1.5  # standard errors below 1, from which on samples are taken for fewer than they seem
@@ -62,9 +63,9 @@ def spread_of(variance: float, centred: float) -> float:
     for _ in range(40):
         middle = 0.5 * (low + high)
         square = middle * middle
-        harmonic = (4.0 * square + 1.0 / pi**2) * exp(-2.0 * pi**2 * square)
+        harmonic = (4.0 * square + _HARMONIC) * exp(_DAMPING * square)
         low, high = (middle, high) if square + 1.0 / 12.0 - centred * harmonic < variance else (low, middle)
-    return low * (1.0 - _CAREFUL * exp(-2.0 * pi**2 * low * low))
+    return low * (1.0 - _CAREFUL * exp(_DAMPING * low * low))
 
 
 def spread_within_two(share: float) -> float:

@@ -49,6 +49,8 @@ class OneShotEvents:
 
     def lacks_air(self, voltage_v: float) -> bool:
         """Decide whether the pressure is too low to move the tool at this voltage, as far as it is measured."""
+        if not isfinite(self._pressure_pa):
+            return False
         return lacks_air(self._pressure_pa, self._expected_pa(voltage_v), learned=isfinite(self._learned_pa_per_v))
 
     def _expected_pa(self, voltage_v: float) -> float:

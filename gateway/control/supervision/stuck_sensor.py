@@ -29,6 +29,7 @@ class StuckSensorCheck:
 
     def __init__(self, supervision: Supervision) -> None:
         self._frozen_s = supervision.frozen_s
+        self._dead_s = _DEAD_SHARE * self._frozen_s
         self._least_change_n = _QUANTA * supervision.sample_quantum_n
         self._reported_limit = supervision.frozen_equal_samples
         self._noise = RepeatedReadings()
@@ -72,7 +73,7 @@ class StuckSensorCheck:
         self._least_n = max(self._least_n, least_n + response.outside_n)
         self._most_n = min(self._most_n, most_n + response.outside_n)
         self._airless_s = self._airless_s + reading.interval_s if response.lacks_air else 0.0
-        if self._airless_s >= _DEAD_SHARE * self._frozen_s:  # a pressure that rises comes behind its voltage, too
+        if self._airless_s >= self._dead_s:  # a pressure that rises comes behind its voltage, too
             self._moved_s = 0.0
         elif self._least_n - self._most_n > self._least_change_n + self._slack_n:  # the force must have moved
             self._moved_s += reading.interval_s
@@ -80,7 +81,7 @@ class StuckSensorCheck:
     @property
     def words(self) -> str:
         """Observation and why it cannot be, empty for a cell that may be alive."""
-        if self._same_s >= self._frozen_s and self._moved_s >= max(_DEAD_SHARE * self._frozen_s, self._answer_s):
+        if self._same_s >= self._frozen_s and self._moved_s >= max(self._dead_s, self._answer_s):
             return f"repeated for {self._same_s:.2f} s while the force must have changed"
         if self._reported_limit is not None or self._equal_s >= self._frozen_s:
             return self.repeats or self._repeats_since_earlier

@@ -64,7 +64,7 @@ class Turning:
         valve, parts, status = self.valve, machine.parts, line.valve
         if valve is None or status is None:
             return False
-        pulls = bool(self._commands.command.control_word & _PULL)
+        pulls = bool(int(self._commands.command.control_word) & _PULL)
         wanted = valve.wanted(pulls=pulls, is_enabled=machine.is_enabled)
         is_left = self._follow_pressure(now_s, line.standing_v, parts.loop)
         is_vented = parts.loop.voltage_v <= 0.0 and not is_left

@@ -207,11 +207,12 @@ class TemplateCellDevice:
 
     def _encode_frame(self, raw: float, quality: Quality) -> bytes:
         number = round(raw, self._decimals) if isfinite(raw) else raw
-        if (number, quality) not in self._known:
+        known = self._known.get((number, quality))
+        if known is None:
             if len(self._known) >= _MOST_KNOWN:
                 self._known.clear()
-            self._known[number, quality] = self._spell_frame(number, quality)
-        return self._known[number, quality]
+            known = self._known[number, quality] = self._spell_frame(number, quality)
+        return known
 
     def _spell_frame(self, number: float, quality: Quality) -> bytes:
         words, has_sign = self._words_beside(quality, is_negative=number < 0.0)

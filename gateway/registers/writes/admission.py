@@ -37,9 +37,9 @@ from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
 
-ENABLE: Final = int(ControlBit.ENABLE)
+ENABLE, TARE = int(ControlBit.ENABLE), int(ControlBit.TARE)
 TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
-STARTS: Final = ENABLE | RUN_BITS
+STARTS: Final = ENABLE | int(RUN_BITS)
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 ALL_BITS: Final = 0xFFFF
@@ -157,7 +157,7 @@ class Admission:
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
         """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
-        if admitted.command.control_word & ControlBit.TARE:
+        if int(admitted.command.control_word) & TARE:
             self._last_tares.note(admitted.command.peer, admitted.command.heartbeat, admitted.command.received_s)
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
@@ -263,7 +263,7 @@ class Admission:
     def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
             self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
-        for held, bit in ((self.held_enables, ControlBit.ENABLE), (self._last_tares, ControlBit.TARE)):
+        for held, bit in ((self.held_enables, ENABLE), (self._last_tares, TARE)):
             offsets = self._offsets(write) if held.knows(write.host) else ()
             if HEARTBEAT in offsets:
                 held.hear(write.host, heartbeat, write.sender[1])
@@ -302,7 +302,7 @@ class Admission:
 
     def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
         host, beat, now_s = command.peer, command.heartbeat, command.received_s
-        if not command.control_word & ControlBit.TARE:
+        if not int(command.control_word) & TARE:
             return
         if self._last_tares.repeats(host, beat if brings_beat else None, now_s):
             self._last_tares.note(host, beat, now_s)

@@ -165,27 +165,31 @@ class CalibrationRuns:
         """Follow the run; to be called after each step of the controller."""
         self._decision = decision
         calibrating = self._calibrating
-        if calibrating.running:
+        is_running = calibrating.running
+        if is_running:
             self._phase_before_end = calibrating.phase
-        self._follow_ends(decision)
+        if is_running is not self._was_running:
+            self._follow_ends(decision)
+        if not is_running and self._recording is None and self._closing_s is None:
+            return  # nobody calibrates, most of the time
         if calibrating.recorded and self._recording is None:
             self._begin()
         elif self._closing_s is not None:
             if self._clock() - self._closing_s > _CLOSING_S:
                 self._close_ladder()
-        elif self._recording is not None and not calibrating.running:
+        elif self._recording is not None and not is_running:
             self._end(decision)
         elif self._recording is not None and (failure := self._recording.failure):
             calibrating.ask_stop(f"A330 calibration stopped: {failure}")
-        elif calibrating.running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
+        elif is_running and calibrating.is_local and self._clock() - self._followed_s > FOLLOWED_S:
             calibrating.ask_stop("A330 calibration stopped: nobody at this machine follows it any more")
 
     def _follow_ends(self, decision: Output) -> None:
         """Forget what the run before has left, whoever has begun this one; of a self-test nothing else tells its end."""
-        was_running, self._was_running = self._was_running, self._calibrating.running
-        if self._was_running and not was_running:
+        self._was_running = not self._was_running
+        if self._was_running:
             self._ended, self._result, self._is_self_test = "", {}, self._calibrating.recorded is None
-        elif was_running and not self._was_running and self._is_self_test:
+        elif self._is_self_test:
             self._ended = decision.events[0] if decision.events else ""
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:

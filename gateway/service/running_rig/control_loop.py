@@ -225,12 +225,13 @@ class ControlLoop:
     def _line(self, now_s: float) -> LineStatus:
         suspended_s, output = self.last_tick.suspended_s(), self.output
         late_s = self.last_tick.late_s(now_s, suspended_s)
+        output_fault, cell = output.fault, self._cell.identity
         return LineStatus(
             acknowledged_v=output.confirmed_v if self.is_watched else None,  # then no enable is taken
             standing_v=output.standing_v,
             unanswered_since_s=output.unanswered_since_s,
-            fault=self.output_lost or output.fault or self._cell.identity.fault,
-            said=output.said if output.fault or not self._cell.identity.fault else self._cell.identity.said,
+            fault=self.output_lost or output_fault or cell.fault,
+            said=output.said if output_fault or not cell.fault else cell.said,
             cell_lost=self.cell_lost,
             pressure_pa=output.pressure_pa,
             pressure_pa_per_v=self.pressure_pa_per_v,

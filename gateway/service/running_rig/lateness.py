@@ -67,10 +67,12 @@ class Lateness:
         self._look_at_rig(now_s)
 
     def _look_at_rig(self, now_s: float) -> None:
-        turns = self._rig.read() if self._rig else None
+        if self._rig is None:
+            return
+        turns = self._rig.read()
         known, self._rig_turns = self._rig_turns, turns
         if turns is None or turns == known:
-            if self._rig and turns and now_s - self._rig_ran_s >= _STILL_S:
+            if turns and now_s - self._rig_ran_s >= _STILL_S:
                 self._is_rig_stopped = self._rig.state() in STOPPED_STATES
             return
         if self._is_rig_stopped:

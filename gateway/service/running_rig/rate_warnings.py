@@ -11,6 +11,7 @@ every quarter of an hour. So the warning comes long before the fault, and a line
 from collections import deque
 from collections.abc import Callable, Sequence
 from math import ceil, inf
+from operator import add
 from typing import Final
 
 from gateway.codes.explanation import BUSY_CURE, is_cause
@@ -32,7 +33,7 @@ _NOISE: Final = (
 _BUSY: Final = (
     "our own loop is late (A342), which tears answers, too: end other programs, or `run --realtime`, then look again"
 )
-_ENDING: Final = int(WarningBit.SERIAL_NOISE | WarningBit.SLOW_LOOP)
+_NOISY, _SLOW = int(WarningBit.SERIAL_NOISE), int(WarningBit.SLOW_LOOP)
 _NONE_READ: Final = "none could be read: another speed, another device or profile? force-gateway check the rig"
 
 
@@ -48,9 +49,7 @@ class _RecentSums:
         if now_s - self._begun_s >= _BIN_S:
             self._begun_s, self._sums = now_s, self._none.copy()
             self._bins.append((now_s, self._sums))
-        sums = self._sums
-        for k, amount in enumerate(amounts):
-            sums[k] += amount
+        self._sums[: len(amounts)] = map(add, self._sums, amounts)
 
     def totals(self, now_s: float) -> list[float]:
         recent = (sums for begun_s, sums in self._bins if now_s - begun_s < WINDOW_S)
@@ -198,12 +197,12 @@ class RateWarnings:
         """Count a tick of the loop, as `SlowLoop.tick` has it, and end what is over."""
         if sentence := self._slow_loop.tick(now_s, expirations, late_s, processor_time):
             self._begin(WarningBit.SLOW_LOOP, sentence)
-        if not int(self.bits) & _ENDING:
-            return
-        lasts = [line.lasts(now_s) for line in (self._cell, self._output)]
-        if self.bits & WarningBit.SERIAL_NOISE and not any(lasts):
-            self.bits &= ~WarningBit.SERIAL_NOISE
-        if self.bits & WarningBit.SLOW_LOOP and not self._slow_loop.lasts(now_s):
+        bits = int(self.bits)
+        if bits & _NOISY:
+            lasts = [line.lasts(now_s) for line in (self._cell, self._output)]
+            if not any(lasts):
+                self.bits &= ~WarningBit.SERIAL_NOISE
+        if bits & _SLOW and not self._slow_loop.lasts(now_s):
             self.bits &= ~WarningBit.SLOW_LOOP
 
     def forget_cell(self) -> None:

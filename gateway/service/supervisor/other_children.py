@@ -43,7 +43,7 @@ class OtherChildren:
     @property
     def due_s(self) -> float:
         """Time at which `poll_children` has something to do without an event, s."""
-        return min((one.due_s for one in self._watched), default=inf)
+        return min([one.due_s for one in self._watched], default=inf)
 
     @property
     def pids(self) -> dict[str, int | None]:

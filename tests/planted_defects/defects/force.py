@@ -39,7 +39,7 @@ DEFECTS = (
     Defect("a contact of before a rest counts as lost", "control/force_loop/force_loop.py",
            "        self._was_touching = False  # or", "        pass  # or", ("control/test_rest_forgets.py",)),
     Defect("what the output has kept does not leave", "control/force_loop/force_loop.py",
-           "        self.left.advance(self.voltage_v, line, dt_s)\n", "", ("control/force_loop/test_force_loop.py",)),
+           "        self.left.advance(self._limiter.voltage_v, line, dt_s)\n", "", ("control/force_loop/test_force_loop.py",)),
     Defect("a first rise that is too high goes on", "control/force_loop/force_loop.py",
            "        if inputs.held_back:\n            goal_n = min(",
            "        if False:\n            goal_n = min(",

@@ -121,7 +121,7 @@ DEFECTS = (
            "self._note_refused_write(noted, peer)",
            ("registers/test_framing_refusals.py",)),
     Defect("a register of the status cuts its value off", "registers/status_block.py",
-           "round(count) & 0xFFFF", "int(count) & 0xFFFF",
+           "map(round, map(mul, numbers", "map(int, map(mul, numbers",
            ("registers/bank/test_status.py",)),
     Defect("who has staged nothing cannot roll back", "registers/upload/staging_block.py",
            "if word in (CommitAction.COMMIT, CommitAction.DRY_RUN):", "if word:",

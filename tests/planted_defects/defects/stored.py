@@ -25,7 +25,7 @@ DEFECTS = (
     Defect("what the disk refuses at this machine is not audited", "audit/rig_audit.py",
            "except (ValueError, OSError) as error:", "except ValueError as error:", ("audit/test_rig_audit.py",)),
     Defect("the end of a calibration is audited as its start", "audit/write_audit.py",
-           'ControlBit.START_CALIBRATION: "stop_calibration"', 'ControlBit.START_CALIBRATION: "start_calibration"',
+           '"start_calibration": "stop_calibration"', '"start_calibration": "start_calibration"',
            ("audit/test_write_audit.py",)),
     Defect("the slope's floor is that of the whole range", "bsfm/curve.py",
            "least = floor * (high - low) * scale", "least = floor * scale", ("bsfm/test_validate_coefficients.py",)),

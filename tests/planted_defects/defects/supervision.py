@@ -70,7 +70,7 @@ DEFECTS = (
            "if self._same_s >= self._frozen_s and self._moved_s", "if False and self._moved_s",
            ("control/supervision/readings/test_stuck_sensor.py", "control/supervision/test_fault_detection.py")),
     Defect("a quiet cell is dead where no air moves it", "control/supervision/stuck_sensor.py",
-           "if self._airless_s >= _DEAD_SHARE", "if False and self._airless_s >= _DEAD_SHARE",
+           "if self._airless_s >= self._dead_s", "if False and self._airless_s >= self._dead_s",
            ("control/supervision/test_unreachable_force.py",)),
     Defect("a second enable forgets how long a cell has been dead", "control/supervision/stuck_sensor.py",
            "        self._earlier += self._equal\n", "        self._earlier = self._equal\n",

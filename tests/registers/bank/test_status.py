@@ -113,6 +113,12 @@ def test_a_measured_value_beyond_int16_is_clamped_there_only(bank, register_map)
     assert shown(bank, register_map, "force_measured@float_abcd") == pytest.approx(3.4028235e38)
 
 
+def test_a_number_that_rounds_to_the_word_for_none_is_a_number_still(bank, register_map):
+    bank.publish(FULL._replace(force_measured_n=-327.678))
+    assert shown(bank, register_map, "force_measured") == -327.67
+    assert shown(bank, register_map, "force_measured@float_abcd") == pytest.approx(-327.678)
+
+
 def test_a_publish_keeps_owner_and_last_refusal(bank, master, register_map):
     master.write(0, 1, 1200)
     master.refusal(master.write, 1, 6500)

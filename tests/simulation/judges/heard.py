@@ -34,14 +34,21 @@ RTU_OUTPUT = "waveshare-ao8b"
 OUTPUTS = (*SENTENCES, RTU_OUTPUT)
 
 
+def _crc_of(byte: int) -> int:
+    for _ in range(8):
+        byte = (byte >> 1) ^ (0xA001 if byte & 1 else 0)
+    return byte
+
+
+CRC_OF = tuple(map(_crc_of, range(256)))
+
+
 @lru_cache(1024)
 def crc16(data: bytes) -> int:
     """Of Modbus RTU."""
     crc = 0xFFFF
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+        crc = (crc >> 8) ^ CRC_OF[(crc ^ byte) & 0xFF]
     return crc
 
 

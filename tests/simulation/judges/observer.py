@@ -271,11 +271,11 @@ class Observer:
             ("I4", self.disabled_s, down_s),
         )
         for law, since_s, bound_s in limits:
+            if since_s is None or now_s - since_s <= bound_s + grace_s:
+                continue
             if self.control_lost_s is not None and law != "I3 control":
                 continue  # who stands still hears nothing: then it is the guardian's turn, within its own bound
-            if law in ("I4", "I3 master") and not self.is_answered_by(now_s):
-                continue
-            if since_s is not None and now_s - since_s > bound_s + grace_s:
+            if law not in ("I4", "I3 master") or self.is_answered_by(now_s):
                 self.complain(
                     law, f"{self.voltage_v:.3f} V for {standing_s:.3f} s, {now_s - since_s:.3f} s after", now_s
                 )

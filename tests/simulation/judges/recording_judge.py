@@ -115,11 +115,12 @@ def _judge_laid(
         at_s = begun_s + row["time_s"]
         if _is_near(history.awoken, at_s, AWAKE_S) or _is_near(history.frozen, at_s, TURN_S):
             continue  # what has waited for it came before, or behind what it was taken for
-        if _key(at_s) not in readings:
+        key = _key(at_s)
+        if key not in readings:
             if not _is_near(history.awoken, at_s + DATED_S, DATED_S):
                 yield f"nothing came at {at_s:.4f}"
             continue
-        force_n = readings[_key(at_s)] if history.is_plain else None
+        force_n = readings[key] if history.is_plain else None
         if force_n is None or not isfinite(row["force_n"]):
             if force_n is not None and abs(force_n) < RANGE_N:
                 yield f"{force_n:.2f} N came at {at_s:.4f}, and it tells none"

@@ -51,6 +51,7 @@ class Cable:
         self.strange_s = 0.0  # when something strange was said last
         self.on_dropped: Callable[[bytes], None] = lambda sent: None  # of a message whose rest its host has forgotten
         self.spoiled_s = -inf  # when an answer of the device was spoiled last
+        self.falsified_s = 0.0  # when its host has heard last what the device has not said, or not so
         self.answers = 0  # what the device has said so far, in sentences
         self.heard_s = 0.0  # when the host has got something last
         self.on_host: Callable[[bytes, float], None] = lambda chunk, now_s: None  # what the host has got
@@ -67,7 +68,7 @@ class Cable:
 
     def drop_unsent(self) -> None:
         """Of what the host has written only what is on the wire by now arrives: its driver forgets the rest."""
-        now_s, dropped = self._outside.time(), self._to_device
+        now_s, dropped = self._outside.clock.now_s, self._to_device
         if not dropped.waiting:
             return
         dropped.is_cut, self._to_device = True, Direction()
@@ -82,24 +83,17 @@ class Cable:
     @property
     def backlog_s(self) -> float:
         """Time until the device's last byte is through."""
-        return max(0.0, self._to_host.through_s - self._outside.time())
+        return max(0.0, self._to_host.through_s - self._outside.clock.now_s)
 
     @property
     def through_s(self) -> float:
         """When the host's last byte will have arrived."""
-        return max(self._outside.time(), self._to_device.through_s + 2e-9)
-
-    @property
-    def falsified_s(self) -> float:
-        """When its host has heard last what the device has not said, or not so."""
-        return max(self.strange_s, self.spoiled_s)
+        return max(self._outside.clock.now_s, self._to_device.through_s + 2e-9)
 
     def is_disturbed(self, now_s: float) -> bool:
         """Whether what its device says does not arrive as it says it, or has not a moment ago."""
-        strange_since_s = now_s - STRANGE_S
         return bool(
-            self.strange_s > strange_since_s
-            or self.spoiled_s > strange_since_s
+            self.falsified_s > now_s - STRANGE_S
             or self._spoils
             or not self.is_plugged
             or self.is_deaf
@@ -109,7 +103,7 @@ class Cable:
     def send_to_device(self, data: bytes) -> None:
         """Put a host's bytes on the wire."""
         if self.is_deaf:
-            self.on_unheard(self._outside.time())
+            self.on_unheard(self._outside.clock.now_s)
         elif self.is_plugged:  # a host that stood still meanwhile has not noticed yet
             self._put(self._to_device, data, self._arrive)
 
@@ -129,12 +123,12 @@ class Cable:
 
     def say(self, data: bytes) -> None:
         """Bytes that are not as the device said them, or not when: of whatever else is on this wire."""
-        self.strange_s = self._outside.time()
+        self.strange_s = self.falsified_s = self._outside.clock.now_s
         if self.is_plugged:
             self._put(self._to_host, data, self._reach_host)
 
     def _send_spoiled(self, data: bytes) -> None:
-        self.spoiled_s = self._outside.time()
+        self.spoiled_s = self.falsified_s = self._outside.clock.now_s
         for late_s, piece in spoiled(self._spoils.popleft(), data):
             self._outside.call_later(late_s, self.say, piece) if late_s else self.say(piece)
 
@@ -150,11 +144,9 @@ class Cable:
         self.is_plugged = True
 
     def _put(self, direction: Direction, data: bytes, take: Callable[[Direction, bytes], None]) -> None:
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         begin_s = direction.through_s if direction.through_s > now_s else now_s
-        room = MOST_QUEUED - int((begin_s - now_s) / self._character_s)
-        if len(data) > room:
-            data = data[: max(0, room)]
+        data = data[: max(0, MOST_QUEUED - int((begin_s - now_s) / self._character_s))]
         if data and self.adapter_s and direction is self._to_host:
             self._put_in_pieces(direction, data, begin_s)
         elif data:
@@ -169,7 +161,7 @@ class Cable:
             come = min(len(data), int((turn * self.adapter_s - begin_s) / self._character_s))
             if come > sent:
                 direction.waiting.append((begin_s, data[sent:come]))
-                at_s = max(turn * self.adapter_s, self._outside.time()) + 1e-9
+                at_s = max(turn * self.adapter_s, self._outside.clock.now_s) + 1e-9
                 self._outside.call_at(at_s, self._reach_host, direction, data[sent:come])
                 sent = come
             turn += 1
@@ -177,12 +169,12 @@ class Cable:
     def _arrive(self, direction: Direction, data: bytes) -> None:
         direction.waiting.popleft()
         if not direction.is_cut:
-            self.on_device(data, self._outside.time())
+            self.on_device(data, self._outside.clock.now_s)
 
     def _reach_host(self, direction: Direction, data: bytes) -> None:
         direction.waiting.popleft()
         if self.port and not direction.is_cut:
-            self.heard_s = self._outside.time()
+            self.heard_s = self._outside.clock.now_s
             self.on_host(data, self.heard_s)
             self.port.hear(data)
 

@@ -311,9 +311,10 @@ class SimulatedService:
 
     def _readable(self, numbers: list[int], timeout_s: float) -> set[int]:
         """Stands for `wait_readable`: nobody waits here."""
-        dead = {process.died for process in self._processes[-2:] if process.exit_code is not None}
-        asked = {self._signals.descriptor} if self._signals.count else set()
-        return readable_ends(numbers) | (dead | asked) & set(numbers)
+        readable = {process.died for process in self._processes[-2:] if process.exit_code is not None}
+        if self._signals.count:
+            readable.add(self._signals.descriptor)
+        return readable_ends(numbers) | readable.intersection(numbers)
 
     # -- control
 

@@ -20,28 +20,22 @@ BEGIN_S = 1000.0
 EPOCH_S = 1.7e9
 
 
-class Handle(asyncio.TimerHandle):
-    """asyncio's, without what it keeps for a loop that debugs, for the gate makes millions of them. A callback for which no
-    context is given runs in the one that all share: here nobody sets a variable of it."""
+class Handle(list[Any]):
+    """[time, place, callback, arguments, loop, context]: in place of asyncio's, for the gate makes millions of them, and a list
+    is made and compared at once. A callback for which no context is given runs in the one that all share: here nobody sets a
+    variable of it. A cancelled timer has no callback, and is passed over when it is due."""
 
     __slots__ = ()
 
-    def __init__(
-        self, when: float, callback: Callable[..., Any], args: tuple[Any, ...], loop: "VirtualLoop", context: Any
-    ) -> None:
-        self._when, self._callback, self._args, self._loop, self._context = when, callback, args, loop, context
-        self._cancelled = False
-
     def __repr__(self) -> str:
-        return f"<{self._callback!r} at {self._when:g} s>"
+        return f"<{self[2]!r} at {self[0]:g} s>"
 
     def cancel(self) -> None:
-        """A cancelled timer is passed over when it is due."""
-        self._cancelled, self._args = True, ()
+        self[2:4] = None, ()
 
     def tell(self, error: Exception) -> None:
         """Tell the loop what the callback has raised, as asyncio's handle does."""
-        self._loop.call_exception_handler({"message": f"Exception in {self!r}", "exception": error, "handle": self})
+        self[4].call_exception_handler({"message": f"Exception in {self!r}", "exception": error, "handle": self})
 
 
 class VirtualClock:
@@ -52,7 +46,7 @@ class VirtualClock:
         self.now_s = BEGIN_S
         self.jump_s = 0.0
         self.ready: deque[Handle] = deque()
-        self.timers: list[tuple[float, int, Handle]] = []
+        self.timers: list[Handle] = []
         self.places = count()
 
     def monotonic(self) -> float:
@@ -79,24 +73,24 @@ class VirtualClock:
                 if ready:
                     handle = ready.popleft()
                 elif timers and timers[0][0] <= end_s:
-                    when_s, _, handle = heappop(timers)
-                    if when_s > self.now_s:
-                        self.now_s = when_s
+                    handle = heappop(timers)
+                    if handle[0] > self.now_s:
+                        self.now_s = handle[0]
                 else:
                     self.now_s = max(self.now_s, end_s)
                     return
-                loop = handle._loop
+                _, _, callback, arguments, loop, context = handle
                 if loop.is_halted:
                     loop.waiting.append(handle)
-                elif not handle._cancelled:
+                elif callback is not None:
                     if loop is not running and loop.has_tasks:
                         running = loop
                         asyncio._set_running_loop(loop)
                     try:
-                        if handle._context is None:
-                            handle._callback(*handle._args)
+                        if context is None:
+                            callback(*arguments)
                         else:
-                            handle._context.run(handle._callback, *handle._args)
+                            context.run(callback, *arguments)
                     except Exception as error:
                         handle.tell(error)
         finally:
@@ -109,14 +103,14 @@ class VirtualLoop(asyncio.SelectorEventLoop):
 
     def __init__(self, clock: VirtualClock, *, has_tasks: bool = True) -> None:
         super().__init__()
-        self._virtual_clock = clock
+        self.clock = clock
         self.servers: dict[int, Any] = {}
         self.is_halted = False
         self.has_tasks = has_tasks
         self.waiting: list[Handle] = []
 
     def time(self) -> float:
-        return self._virtual_clock.now_s
+        return self.clock.now_s
 
     def halt(self) -> None:
         """Stop as SIGSTOP stops a process, or SIGKILL."""
@@ -125,29 +119,30 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def go_on(self) -> None:
         """Do what has become due meanwhile, in its order, and go on."""
         self.is_halted = False
-        self._virtual_clock.ready.extend(self.waiting)
+        self.clock.ready.extend(self.waiting)
         self.waiting.clear()
 
-    def call_soon(self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None) -> Handle:
-        handle = Handle(0.0, callback, args, self, context)
-        self._virtual_clock.ready.append(handle)
+    def call_soon(  # type: ignore[override]
+        self, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
+    ) -> Handle:
+        handle = Handle((0.0, 0, callback, args, self, context))
+        self.clock.ready.append(handle)
         return handle
 
-    call_soon_threadsafe = call_soon  # there are no threads
+    call_soon_threadsafe = call_soon  # type: ignore[assignment]  # there are no threads
 
-    def call_later(
+    def call_later(  # type: ignore[override]
         self, delay: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
-        clock = self._virtual_clock
-        when_s = clock.now_s + delay
-        handle = Handle(when_s, callback, args, self, context)
-        heappush(clock.timers, (when_s, next(clock.places), handle))
+        clock = self.clock
+        handle = Handle((clock.now_s + delay, next(clock.places), callback, args, self, context))
+        heappush(clock.timers, handle)
         return handle
 
-    def call_at(
+    def call_at(  # type: ignore[override]
         self, when: float, callback: Callable[..., Any], *args: Any, context: contextvars.Context | None = None
     ) -> Handle:
-        clock = self._virtual_clock
-        handle = Handle(when, callback, args, self, context)
-        heappush(clock.timers, (when, next(clock.places), handle))
+        clock = self.clock
+        handle = Handle((when, next(clock.places), callback, args, self, context))
+        heappush(clock.timers, handle)
         return handle

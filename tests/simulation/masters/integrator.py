@@ -173,7 +173,7 @@ class Integrator(Master):
             sets.begin_with(words)
         elif words not in sets.allowed:
             which = f"the set with the CRC-32 {crc32(words):08x}"
-            self.complaints.append(f"I9 at {self._outside.time():.4f}: {which} is in use, which nobody committed")
+            self.complaints.append(f"I9 at {self._outside.clock.now_s:.4f}: {which} is in use, which nobody committed")
 
     def _note_commit(self, sent: bytes, answer: bytes) -> None:
         is_committed = answer[0] == 3 and answer[3] == COMMITTED

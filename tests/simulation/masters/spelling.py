@@ -20,9 +20,8 @@ DISABLED_BY_BIT, BITS = -2, -1
 
 def write_pdu(address: int, *words: int) -> bytes:
     """FC16."""
-    return struct.pack(
-        f">BHHB{len(words)}H", 16, address, len(words), 2 * len(words), *(word & 0xFFFF for word in words)
-    )
+    count = len(words)
+    return struct.pack(f">BHHB{count}H", 16, address, count, 2 * count, *[word & 0xFFFF for word in words])
 
 
 def write_one_pdu(address: int, word: int) -> bytes:

@@ -143,7 +143,7 @@ class Master:
     def _send(self, data: bytes) -> None:
         """Send bytes, behind whatever of this connection still waits for its time."""
         assert self._line
-        now_s = self._outside.time()
+        now_s = self._outside.clock.now_s
         if not self._cut and self._free_s < now_s:  # at the same moment a piece may still wait for its turn
             self._line.send(data)
             return
@@ -274,7 +274,7 @@ class Master:
                 f"I8: {self.name} asked {asked.transaction} {asked.pdu.hex()}, was answered {transaction} {pdu.hex()}"
             )
             return
-        self.heard.append((self._outside.time(), pdu))
+        self.heard.append((self._outside.clock.now_s, pdu))
         del self.heard[:-64]
         self.on_start(asked.pdu, not pdu[0] & 0x80)
         if pdu[0] & 0x80:

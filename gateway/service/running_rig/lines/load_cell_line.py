@@ -90,7 +90,7 @@ class CellExchange:
             messages = [replace(one, time_s=came_s) if isinstance(one, ForceSample) else one for one in messages]
         self.unread.hear(messages, now_s)
         if not self._question:  # a stream
-            if any(not isinstance(one, Garbage) for one in messages):
+            if self._start and any(not isinstance(one, Garbage) for one in messages):
                 self._start_s = now_s + _START_AGAIN_S
             return messages
         if any(not isinstance(one, Garbage) for one in messages):

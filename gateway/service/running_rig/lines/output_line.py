@@ -179,17 +179,13 @@ class OutputExchange:
             if not (self._is_behind and is_fall):
                 return
             self._give_up(self._in_flight)
-        # where something presses and does not fall; every other time at most, or one that is not answered looks like silence
-        gives_way = (
-            self._asked_v <= wanted_v != self._rest_v and self._said_s == self._sent_s and self.checks.is_late(now_s)
-        )
         if self._host.sign_of_life and now_s >= self._next_feed_s:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
         elif wanted_v == self._refused_v and (step := self.checks.next_step(now_s)):
             self._refused_v = nan
             self._send(AskDevice(step), now_s)
-        elif not (gives_way or self._is_confirmed(wanted_v)) and self._may_obey(wanted_v, now_s):
+        elif not (self._is_confirmed(wanted_v) or self._gives_way(wanted_v, now_s)) and self._may_obey(wanted_v, now_s):
             self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
                 self._before_v = self._asked_v
@@ -218,6 +214,10 @@ class OutputExchange:
         surely stands: a device whose answer was lost may have obeyed, and must hear the safe voltage."""
         standing_v = self.standing_v
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
+
+    def _gives_way(self, wanted_v: float, now_s: float) -> bool:
+        """To a late check, where something presses and does not fall; not twice running, or no answer looks like silence."""
+        return self._asked_v <= wanted_v != self._rest_v and self._said_s == self._sent_s and self.checks.is_late(now_s)
 
     def _may_obey(self, voltage_v: float, now_s: float) -> bool:
         """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be."""
