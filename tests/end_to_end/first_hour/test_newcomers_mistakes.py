@@ -1,9 +1,17 @@
-"""What a newcomer gets wrong at a running gateway: an exception for the client, a sentence with a code for the person."""
+"""What a newcomer gets wrong at a running gateway: an exception for the client, a sentence with a code for the person; of
+coefficients that no cylinder has, their line, before anything is sent."""
 
 import math
 import struct
+from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
+
+from gateway.cli.main import command
+from tests.end_to_end.conftest import RunningGateway
+
+DEMO = Path(__file__).parents[3] / "profiles" / "calibrations" / "demo.yaml"
 
 
 def float_words(value: float) -> list[int]:
@@ -57,3 +65,20 @@ def test_a_flood_of_mistakes_is_ten_lines_a_second_and_the_gateway_goes_on(reste
     assert 1 <= lines <= 40
     assert not rested.write(0, 1, 900).isError()
     rested.wait_until(lambda status: abs(status["force_measured"] - 900) <= 100)
+
+
+def uploaded(gateway: RunningGateway, file: Path) -> tuple[int, str]:
+    done = CliRunner().invoke(command, ["upload", str(file), "--gateway", f"127.0.0.1:{gateway.port}"])
+    return done.exit_code, done.output
+
+
+def test_refused_coefficients_are_named_and_the_active_set_stays(rested: RunningGateway, tmp_path: Path) -> None:
+    before = rested.words(1500, 60)
+    text = DEMO.read_text()
+    assert "65.2319041283]" in text
+    (tmp_path / "falls.yaml").write_text(text.replace("65.2319041283]", "-5.0]", 1))
+    code, said = uploaded(rested, tmp_path / "falls.yaml")
+    assert code == 65
+    assert "falls.yaml:9:20 rising_handles_n[0]: the rising branch is not increasing" in said
+    assert rested.words(1500, 60) == before
+    assert math.isclose(rested.force_n(), 0.0, abs_tol=2.0)
