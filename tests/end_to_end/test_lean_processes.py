@@ -72,8 +72,7 @@ def test_the_guardian_maps_no_numpy(rested):
 @pytest.mark.parametrize(
     ("statement", "absent"),
     [
-        ("import gateway.service.control_process", {*HEAVY, "pymodbus", "rich"}),
-        ("import gateway.service.simulated_rig", {*HEAVY, "pymodbus", "rich"}),
+        ("import gateway.service.control_process, gateway.service.simulated_rig", {*HEAVY, "pymodbus", "rich"}),
         (
             "import gateway.service.supervisor.guardian",
             {*HEAVY, "numpy", "asyncio", "yaml", "pydantic", "serial", "click"},
