@@ -1,7 +1,9 @@
 """What the three processes of a running gateway have loaded: the kernel's own list, so that a late import counts too."""
 
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -27,6 +29,21 @@ def loaded_by(statement: str) -> set[str]:
     code = f"import sys; {statement}; print(*{{name.split('.')[0] for name in sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     return set(done.stdout.split())
+
+
+def until_behind(watch: int) -> None:
+    deadline_s = time.monotonic() + 5.0
+    while os.sched_getscheduler(watch) != os.SCHED_IDLE:
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
+
+
+def test_the_watch_stands_behind_everybody_and_loads_nothing_before_it_must(rested):
+    watch = rested.ready["pids"]["watch"]
+    until_behind(watch)
+    assert int(Path(f"/proc/{watch}/oom_score_adj").read_text()) == 900
+    assert os.getpriority(os.PRIO_PROCESS, watch) >= 10
+    assert heavy_files(watch, "numpy") == []
 
 
 def test_nobody_who_holds_the_force_maps_anything_heavy_while_it_works(rested):
@@ -55,8 +72,7 @@ def test_the_guardian_maps_no_numpy(rested):
 @pytest.mark.parametrize(
     ("statement", "absent"),
     [
-        ("import gateway.service.control_process", {*HEAVY, "pymodbus", "rich"}),
-        ("import gateway.service.simulated_rig", {*HEAVY, "pymodbus", "rich"}),
+        ("import gateway.service.control_process, gateway.service.simulated_rig", {*HEAVY, "pymodbus", "rich"}),
         (
             "import gateway.service.supervisor.guardian",
             {*HEAVY, "numpy", "asyncio", "yaml", "pydantic", "serial", "click"},

@@ -19,7 +19,7 @@ from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.profiles import shipped_profiles_folder
 from gateway.registers.residual_cause import ResidualCause
 from tests.end_to_end.conftest import RunningGateway, start, stop
-from tests.end_to_end.test_lean_processes import HEAVY, mapped
+from tests.end_to_end.test_lean_processes import until_behind
 
 WARNING_WORD, RESIDUAL_CAUSE = 111, 129
 LOOP_HZ = 100.0
@@ -75,26 +75,10 @@ def hurry(watch: int) -> None:
         Path(f"/proc/{watch}/autogroup").write_text("0")
 
 
-def until_behind(watch: int) -> None:
-    deadline_s = time.monotonic() + 5.0
-    while os.sched_getscheduler(watch) != os.SCHED_IDLE:
-        assert time.monotonic() < deadline_s
-        time.sleep(0.02)
-
-
 @pytest.fixture
 def watched(watched_gateway: RunningGateway) -> RunningGateway:
     watched_gateway.rest()
     return watched_gateway
-
-
-def test_the_watch_stands_behind_everybody_and_loads_nothing_before_it_must(rested):
-    watch = rested.ready["pids"]["watch"]
-    until_behind(watch)
-    assert int(Path(f"/proc/{watch}/oom_score_adj").read_text()) == 900
-    assert os.getpriority(os.PRIO_PROCESS, watch) >= 10
-    files = mapped(watch)
-    assert not [file for file in files for name in (*HEAVY, "numpy") if f"/{name}" in file]
 
 
 def test_it_looks_says_so_and_leaves_an_idle_machine_alone(watched):

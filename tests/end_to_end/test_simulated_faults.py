@@ -1,19 +1,23 @@
 """`sim` with a running gateway: a fault that is set, told, cleared and reset; an effect while a force is held; and that what is
-set outlives the simulated rig's process."""
+set outlives the simulated rig's process. Of a rig that is wired, set or fed wrongly A301 to A303 say, in numbers, the probable
+cause, and the cure."""
 
 import json
 import os
 import signal
 import time
+from collections.abc import Iterator
 from typing import Any
 
+import pytest
 from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.registers.words import State
-from tests.end_to_end.conftest import RunningGateway
+from tests.end_to_end.conftest import POLL_S, RunningGateway
 
 ENABLE, RESET = 1, 2
+PRECONTACT = 7
 
 
 def verb(running: RunningGateway, *words: str) -> Any:
@@ -88,3 +92,66 @@ def test_what_is_set_outlives_the_simulated_rig_and_nothing_is_set_by_halves(res
     assert sim(rested, "list")["set"] == {"leak.leak_per_s": 0.01, "output.refuse": True}
     recover(rested)
     assert_presses(rested, 10.0)
+
+
+@pytest.fixture
+def healthy(rested: RunningGateway) -> Iterator[RunningGateway]:
+    """Heals what its test has broken."""
+    yield rested
+    sim(rested, "clear")
+    deadline_s = time.monotonic() + 10.0
+    while rested.status()["state"] != State.OFF:
+        rested.write(0, 0, 0)
+        rested.write(0, RESET, 0)
+        assert time.monotonic() < deadline_s, rested.log.read_text()
+        time.sleep(0.05)
+    rested.write(PRECONTACT, 0)
+
+
+def provoked(gateway: RunningGateway, setting: str, force_n: float, code: str, precontact_n: float = 0.0) -> str:
+    """The sentence with this code that comes once a force is asked for."""
+    earlier = len(gateway.log.read_text().splitlines())
+    sim(gateway, "set", setting)
+    gateway.write(PRECONTACT, round(100 * precontact_n))
+    for _ in range(60 if precontact_n else 0):  # what the cell showed before is smoothed away
+        gateway.status()
+        time.sleep(POLL_S)
+    assert not gateway.write(0, ENABLE, round(100 * force_n)).isError()
+    return gateway.said(code, within_s=10.0, after=earlier)
+
+
+def test_no_air_is_told_in_volts_and_newtons(healthy: RunningGateway) -> None:
+    said = provoked(healthy, "air.off=on", 12.0, "A301")
+    assert " V out, " in said
+    assert " N measured, " in said
+    assert "no air, or a closed valve; open the air supply and look at its gauge" in said
+
+
+def test_no_contact_is_told_apart_from_no_air(healthy: RunningGateway) -> None:
+    assert "air is there, so no contact with the workpiece" in provoked(healthy, "contact.off=on", 12.0, "A301")
+
+
+def test_exchanged_wires_stop_with_the_wires_to_swap(healthy: RunningGateway) -> None:
+    said = provoked(healthy, "cell.inverted=on", 12.0, "A302")
+    assert "swap the cell's signal wires or set sign: -1" in said
+    assert healthy.status()["state"] == State.FAULT
+    assert healthy.status()["output_voltage"] == 0
+
+
+def test_a_force_that_reads_far_too_large_stops_before_the_force_is_there(healthy: RunningGateway) -> None:
+    said = provoked(healthy, "cell.scale=5", 12.0, "A303")
+    assert "kgf and N are mixed up; check the unit and span of the load cell in the rig file" in said
+    assert healthy.status()["state"] == State.FAULT
+
+
+def test_kgf_read_as_newtons_stops_once_the_tool_presses(healthy: RunningGateway) -> None:
+    said = provoked(healthy, "cell.kgf=on", 40.0, "A303", precontact_n=20.0)
+    assert "kgf" in said
+    assert "check the unit" in said
+
+
+def test_the_code_is_explained_offline_with_one_thing_to_do() -> None:
+    for code in ("W203", "A301", "A302", "A303", "A310"):
+        told = json.loads(CliRunner().invoke(command, ["explain", code, "--json"]).output)[0]
+        assert told["code"] == code
+        assert told["do"]

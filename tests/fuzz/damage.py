@@ -1,7 +1,9 @@
 """Bytes as a bad wire, a bad disk or a bad neighbour makes them, and how much an object holds."""
 
 from collections.abc import Iterator
+from functools import cache
 from random import Random
+from typing import Any
 
 
 def damaged(data: bytes, chance: Random, most: int = 3) -> bytes:
@@ -33,18 +35,34 @@ def pieces(stream: bytes, chance: Random) -> Iterator[bytes]:
         at += size
 
 
-def held_bytes(thing: object, seen: set[int] | None = None) -> int:
+def held_bytes(thing: object) -> int:
     """Return how many bytes and list items an object of ours keeps, parts included."""
-    seen = set() if seen is None else seen
-    if id(thing) in seen or isinstance(thing, (type, int, float, str)) or callable(thing):
-        return 0
-    seen.add(id(thing))
-    if isinstance(thing, (bytes, bytearray)):
-        return len(thing)
-    if isinstance(thing, (list, tuple, set, frozenset)):
-        return len(thing) + sum(held_bytes(one, seen) for one in thing)
-    if isinstance(thing, dict):
-        return len(thing) + sum(held_bytes(one, seen) for one in thing.values())
-    slots = [name for kind in type(thing).__mro__ for name in getattr(kind, "__slots__", ())]
-    parts = [getattr(thing, name, None) for name in slots] + list(getattr(thing, "__dict__", {}).values())
-    return sum(held_bytes(one, seen) for one in parts)
+    held, waiting, seen = 0, [thing], set[int]()
+    while waiting:
+        one = waiting.pop()
+        kind: Any = type(one)
+        if keeps_nothing(kind) or id(one) in seen or callable(one):
+            continue
+        seen.add(id(one))
+        if isinstance(one, (bytes, bytearray)):
+            held += len(one)
+        elif isinstance(one, (list, tuple, set, frozenset)):
+            held += len(one)
+            waiting.extend(one)
+        elif isinstance(one, dict):
+            held += len(one)
+            waiting.extend(one.values())
+        else:
+            waiting.extend(getattr(one, name, None) for name in slots_of(kind))
+            waiting.extend(getattr(one, "__dict__", {}).values())
+    return held
+
+
+@cache
+def keeps_nothing(kind: type) -> bool:
+    return issubclass(kind, (type, int, float, str))
+
+
+@cache
+def slots_of(kind: type) -> list[str]:
+    return [name for base in kind.__mro__ for name in getattr(base, "__slots__", ())]

@@ -32,18 +32,25 @@ def own_rig(directory: Path, **changes: str) -> Path:
     return directory / "mine.yaml"
 
 
-def test_a_typo_in_the_rig_has_its_place_and_a_proposal(tmp_path: Path):
-    rig = own_rig(tmp_path, name=("name: demo", "name: mine"), key=("  baud: 9600", "  buad: 9600"))
-    code, said = ended(rig, tmp_path / "state")
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int, str]:
+    """A rig of two faults, which are told in one go: its file, the exit code, and what was said."""
+    directory = tmp_path_factory.mktemp("faulty")
+    changes = {"value": ("baud: 9600", "baud: 9700"), "key": ("  baud: 115200", "  buad: 115200")}
+    rig = own_rig(directory, name=("name: demo", "name: mine"), **changes)
+    return rig, *ended(rig, directory / "state")
+
+
+def test_a_typo_in_the_rig_has_its_place_and_a_proposal(faulty: tuple[Path, int, str]):
+    rig, code, said = faulty
     assert code == CONFIGURATION
-    assert re.search(r"mine\.yaml:\d+:\d+", said)
-    assert "did you mean" in said
+    line = rig.read_text().splitlines().index("  buad: 115200") + 1
+    assert re.search(rf"mine\.yaml:{line}:\d+.*did you mean", said)
     assert "Traceback" not in said
 
 
-def test_a_value_that_is_not_allowed_names_the_allowed_ones(tmp_path: Path):
-    rig = own_rig(tmp_path, name=("name: demo", "name: mine"), value=("baud: 9600", "baud: 9700"))
-    code, said = ended(rig, tmp_path / "state")
+def test_a_value_that_is_not_allowed_names_the_allowed_ones(faulty: tuple[Path, int, str]):
+    rig, code, said = faulty
     assert code == CONFIGURATION
     line = rig.read_text().splitlines().index("  baud: 9700") + 1
     assert f"mine.yaml:{line}:" in said
@@ -87,37 +94,6 @@ def test_a_port_below_1024_needs_a_capability(tmp_path: Path):
     assert said.startswith("E120")
 
 
-@pytest.fixture(scope="module")
-def deep(tmp_path_factory: pytest.TempPathFactory):
-    """A gateway whose state directory is too deep for any Unix socket."""
-    state = tmp_path_factory.mktemp("deep") / ("d" * 60) / ("e" * 60) / "state"
-    state.parent.mkdir(parents=True)
-    (state / "recordings").parent.mkdir()
-    (state / "recordings").write_text("a file where the directory should be")
-    gateway = start(state, "--sim", "--record")
-    yield gateway
-    stop(gateway)
-
-
-def test_a_second_gateway_on_the_same_state_is_refused(deep: RunningGateway):
-    code, said = ended("demo", deep.state)
-    assert code == DEVICE
-    assert said.startswith("E104 another gateway already runs on")
-    assert deep.status()["state"] == 0, "the first one goes on"
-
-
-def test_a_state_directory_too_deep_for_a_socket_is_a_note_and_no_end(deep: RunningGateway):
-    (note,) = [note for note in deep.ready["notes"] if "control.sock" in note]
-    assert "107" in note
-    assert "rig.sock" in deep.said("107")
-    assert not deep.write(0, 1, 1000).isError()
-    deep.wait_until(lambda status: abs(status["force_measured"] - 1000) <= 100)
-
-
-def test_a_recording_that_cannot_be_made_is_a_note_and_no_end(deep: RunningGateway):
-    assert [note for note in deep.ready["notes"] if note.startswith("not recording")]
-
-
 def test_a_wrong_baud_is_found_and_named_before_ready(tmp_path: Path):
     rig = own_rig(
         tmp_path,
@@ -148,3 +124,34 @@ def test_one_command_without_a_heartbeat_is_a_lost_master_where_there_is_a_lease
         assert gateway.status()["output_voltage"] == 0
     finally:
         stop(gateway)
+
+
+@pytest.fixture(scope="module")
+def deep(tmp_path_factory: pytest.TempPathFactory):
+    """A gateway whose state directory is too deep for any Unix socket."""
+    state = tmp_path_factory.mktemp("deep") / ("d" * 60) / ("e" * 60) / "state"
+    state.parent.mkdir(parents=True)
+    (state / "recordings").parent.mkdir()
+    (state / "recordings").write_text("a file where the directory should be")
+    gateway = start(state, "--sim", "--record")
+    yield gateway
+    stop(gateway)
+
+
+def test_a_second_gateway_on_the_same_state_is_refused(deep: RunningGateway):
+    code, said = ended("demo", deep.state)
+    assert code == DEVICE
+    assert said.startswith("E104 another gateway already runs on")
+    assert deep.status()["state"] == 0, "the first one goes on"
+
+
+def test_a_state_directory_too_deep_for_a_socket_is_a_note_and_no_end(deep: RunningGateway):
+    (note,) = [note for note in deep.ready["notes"] if "control.sock" in note]
+    assert "107" in note
+    assert "rig.sock" in deep.said("107")
+    assert not deep.write(0, 1, 1000).isError()
+    deep.wait_until(lambda status: abs(status["force_measured"] - 1000) <= 100)
+
+
+def test_a_recording_that_cannot_be_made_is_a_note_and_no_end(deep: RunningGateway):
+    assert [note for note in deep.ready["notes"] if note.startswith("not recording")]

@@ -67,16 +67,11 @@ def test_a_control_process_killed_at_any_moment_of_its_start_comes_up_in_the_end
     assert running.process.poll() is None
 
 
-def test_whoever_else_dies_the_gateway_goes_on(running):
-    assert_a_simulated_rig_comes_back_and_presses_again(running)
-    assert_a_restart_without_fork_server_only_takes_longer(running)
-
-
 @pytest.mark.skipif(os.geteuid() != 0 or len(os.sched_getaffinity(0)) < 2, reason="needs SCHED_FIFO and a second core")
-def test_a_machine_that_does_not_let_the_loop_run_is_named_as_the_cause(running):
+def test_a_machine_that_does_not_let_the_loop_run_is_named_as_the_cause(shared):
     """One core for control, taken from it for longer than stall_s by a process that has every priority."""
     core = min(os.sched_getaffinity(0))
-    control = running.ready["pids"]["control"]
+    control = shared.ready["pids"]["control"]
     os.sched_setaffinity(control, {core})
     hog = (
         f"import os, time; os.sched_setaffinity(0, {{{core}}}); "
@@ -84,13 +79,18 @@ def test_a_machine_that_does_not_let_the_loop_run_is_named_as_the_cause(running)
         "while time.monotonic() < end_s: pass"
     )
     subprocess.run([sys.executable, "-c", hog], check=True)
-    line = running.said("A401", within_s=5.0)
+    line = shared.said("A401", within_s=5.0)
     print(line)
     assert "(A403)" in line
-    reconnect(running)
-    assert running.words(110, 1) == [16], "machine_busy"
-    assert running.words(111, 1)[0] & 1, "restarted"
-    assert any("A403" in note for note in running.ready["notes"])
+    reconnect(shared)
+    assert shared.words(110, 1) == [16], "machine_busy"
+    assert shared.words(111, 1)[0] & 1, "restarted"
+    assert any("A403" in note for note in shared.ready["notes"])
+
+
+def test_whoever_else_dies_the_gateway_goes_on(rested):
+    assert_a_simulated_rig_comes_back_and_presses_again(rested)
+    assert_a_restart_without_fork_server_only_takes_longer(rested)
 
 
 def assert_a_restart_without_fork_server_only_takes_longer(running: RunningGateway) -> None:

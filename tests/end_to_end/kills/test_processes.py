@@ -68,15 +68,18 @@ def test_a_stopped_control_process_is_killed_and_replaced(shared):
     pressing(shared)
     os.kill(shared.ready["pids"]["control"], signal.SIGSTOP)
     assert reconnect(shared)["state"] == OFF
+    shared.next_ready()
 
 
-def test_ctrl_c_ramps_to_zero_and_leaves_no_process_and_no_socket(running):
-    pressing(running, 3000)
-    children = psutil.Process(running.process.pid).children(recursive=True)
-    running.process.send_signal(signal.SIGINT)
-    assert running.process.wait(6) == 0
+def test_ctrl_c_ramps_to_zero_and_leaves_no_process_and_no_socket(shared):
+    """The last one of the gateway that they share."""
+    shared.rest()
+    pressing(shared, 3000)
+    children = psutil.Process(shared.process.pid).children(recursive=True)
+    shared.process.send_signal(signal.SIGINT)
+    assert shared.process.wait(6) == 0
     assert not any(child.is_running() and child.status() != psutil.STATUS_ZOMBIE for child in children)
-    assert not list(running.state.glob("*.sock"))
+    assert not list(shared.state.glob("*.sock"))
 
 
 def test_a_dead_guardian_takes_control_and_rig_with_it(running):

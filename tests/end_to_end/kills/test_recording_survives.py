@@ -3,6 +3,7 @@
 import csv
 import io
 import os
+import re
 import signal
 import time
 from pathlib import Path
@@ -26,13 +27,20 @@ def exported(state: Path, number: int) -> list[dict[str, str]]:
     return list(csv.DictReader(io.StringIO("\n".join(lines))))
 
 
-def test_on_and_off_records_what_was_pressed(running):
-    state = running.state
-    assert "recording to" in gateway_says("record", "on", "--state", state)
-    running.write(0, 1, 1500)
-    running.wait_until(lambda status: status["state"] == 3)
+def begun(state: Path) -> int:
+    """Number of the recording that begins now."""
+    said = re.search(r"recording to .*?(\d{4})\.fgr", gateway_says("record", "on", "--state", state))
+    assert said
+    return int(said[1])
+
+
+def test_on_and_off_records_what_was_pressed(rested):
+    state = rested.state
+    number = begun(state)
+    rested.write(0, 1, 1500)
+    rested.wait_until(lambda status: status["state"] == 3)
     assert "rows" in gateway_says("record", "off", "--state", state)
-    rows = exported(state, 1)
+    rows = exported(state, number)
     assert len(rows) > 20, "a step and its time in band at 100 Hz"
     assert {float(row["setpoint_n"]) for row in rows[-10:]} == {15.0}
     assert abs(float(rows[-1]["force_n"]) - 15.0) <= 1.0
@@ -40,20 +48,20 @@ def test_on_and_off_records_what_was_pressed(running):
     assert times_s == sorted(times_s)
 
 
-def test_kill_minus_nine_loses_at_most_one_batch(running):
-    state = running.state
-    gateway_says("record", "on", "--state", state)
+def test_kill_minus_nine_loses_at_most_one_batch(rested):
+    state = rested.state
+    number = begun(state)
     began_s = time.monotonic()
-    running.write(0, 1, 1200)
-    running.wait_until(lambda status: status["state"] == 3)
+    rested.write(0, 1, 1200)
+    rested.wait_until(lambda status: status["state"] == 3)
     held_from_s = time.monotonic()  # in band takes as long as a batch does: the last row kept may be of the rise
-    running.wait_until(lambda status: status["state"] == 3 and time.monotonic() > held_from_s + 3 * BATCH_S)
-    os.kill(running.ready["pids"]["control"], signal.SIGKILL)
+    rested.wait_until(lambda status: status["state"] == 3 and time.monotonic() > held_from_s + 3 * BATCH_S)
+    os.kill(rested.ready["pids"]["control"], signal.SIGKILL)
     lasted_s = time.monotonic() - began_s
-    rows = exported(state, 1)
+    rows = exported(state, number)
     assert float(rows[-1]["time_s"]) >= lasted_s - BATCH_S - 0.05
     assert abs(float(rows[-1]["force_n"]) - 12.0) <= 1.0
-    assert "1" in gateway_says("recordings", "list", "--state", state)
-    running.said("it goes on behind the restart: recording to")
-    assert "0002.fgr" in gateway_says("record", "status", "--state", state)
-    assert "0002.fgr" in gateway_says("record", "off", "--state", state)
+    assert re.search(rf"^ *{number} ", gateway_says("recordings", "list", "--state", state), re.MULTILINE)
+    rested.said("it goes on behind the restart: recording to")
+    assert f"{number + 1:04}.fgr" in gateway_says("record", "status", "--state", state)
+    assert f"{number + 1:04}.fgr" in gateway_says("record", "off", "--state", state)

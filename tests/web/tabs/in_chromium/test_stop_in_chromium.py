@@ -2,7 +2,7 @@
 more tabs open than a browser has connections.
 
 It has six for all tabs of the page, and the stream of each keeps one: a Stop goes out all the same. Six tabs of a real browser
-take seconds to open.
+take seconds to open. It also says whose it is, and goes out again where the page's process was started anew.
 """
 
 import json
@@ -18,6 +18,11 @@ from tests.web.tabs.test_calibrations_tab import add_calibration
 
 STOP = "1000000001020000"
 CONNECTIONS = 6  # of Chromium and of Firefox, to one host by HTTP/1.1
+POST_STOP = """async () => {
+  const { api } = await import("/static/api.js");
+  globalThis.said = api.post("/api/v1/command/stop").then(() => "stopped", (error) => error.message);
+}"""
+SAID = "() => globalThis.said"
 
 
 @pytest.fixture
@@ -36,6 +41,11 @@ def tabs(page: Any, served: ScriptedControl, chromium: Any) -> Iterator[list[Any
     opened[2].evaluate("() => { new EventSource('/events?viewer=other'); }")
     yield opened
     browser.close()
+
+
+@pytest.fixture
+def browser(chromium: Any) -> Any:
+    return chromium.new_context()
 
 
 def written(control: ScriptedControl) -> list[str]:
@@ -135,3 +145,45 @@ def test_what_was_not_rejected_is_never_asked_for_by_force(page, served: Scripte
     window.get_by_text("it is in use").wait_for()
     assert asked == [{"use": number}]
     browser.close()
+
+
+def test_a_command_goes_out_again_with_the_token_of_the_new_session(page, served: ScriptedControl, browser) -> None:
+    """It was refused as one of a session that is over, and the output stayed on."""
+    tokens = iter(("former", "new"))
+    seen = list[str]()
+
+    def answer(route: Any) -> None:
+        seen.append(route.request.headers["x-csrf-token"])
+        if seen[-1] == "new":
+            route.fulfill(json={})
+        else:
+            route.fulfill(status=403, json={"error": "the session is over: reload the page", "reason": "session"})
+
+    browser.route("**/api/v1/session", lambda route: route.fulfill(json={"csrf": next(tokens)}))
+    browser.route("**/api/v1/command/stop", answer)
+    window = open_tab(browser, page.address, "wiring")
+    window.evaluate(POST_STOP)
+    assert (window.evaluate(SAID), seen) == ("stopped", ["former", "new"])
+
+
+def test_a_command_is_of_the_tab_whose_stream_is_heard(page, served: ScriptedControl, browser) -> None:
+    """Of a command without that name nobody is there: its force ends with the first lease."""
+    window = browser.new_page()
+    with window.expect_request("**/events?*") as stream:
+        window.goto(f"{page.address}/#wiring", wait_until="commit")
+    with window.expect_request("**/api/v1/command/stop") as stop:
+        window.evaluate(POST_STOP)
+    assert stream.value.url.partition("viewer=")[2] == stop.value.headers["x-viewer"]
+    assert window.evaluate(SAID) == "stopped"
+
+
+def test_a_stop_is_not_given_up_as_what_presses_is(page, served: ScriptedControl, browser) -> None:
+    held = list[Any]()
+    browser.route("**/api/v1/command/stop", lambda route: held.append(route))
+    window = open_tab(browser, page.address, "wiring")
+    window.clock.install()
+    with window.expect_request("**/api/v1/command/stop"):
+        window.evaluate(POST_STOP)
+    window.clock.fast_forward(60_000)
+    held[0].fulfill(json={})
+    assert window.evaluate(SAID) == "stopped"
