@@ -215,11 +215,9 @@ class RegisterMap:
             what = "address" if register.address == int(name) else "number"
             return f" by name: {name} is the {what} of {register.name}, so use {register.name}"
         plain = [register.name for register in self.registers if register.block in PLAIN_BLOCKS]
-        known = dict.fromkeys(
-            (*self._by_name, *(register.name for register in self.registers))
-        )  # each is compared once
+        names = dict.fromkeys((*self._by_name, *(register.name for register in self.registers)))
         near = [one for one in plain if name.lower() in one.split("_")] or get_close_matches(
-            name.lower(), known, 1, 0.6
+            name.lower(), names, 1, 0.6
         )
         return f"; did you mean {' or '.join(near)}?" if near else "; force-gateway registers lists them"
 
