@@ -184,6 +184,24 @@ def test_an_arming_that_nobody_answers_leaves_every_other_turn_to_the_setpoint()
     assert line.exchange.checks.times_forgotten == 1 and line.stands_v > 0.1
 
 
+@pytest.mark.parametrize(("next_v", "gives_way"), [(5.0, True), (3.0, False)])
+def test_a_setting_gives_way_to_a_late_question_unless_the_force_falls(
+    next_v: float, gives_way: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = PlayedLine()
+    line.run(0.5)
+    line.exchange.set_voltage(4.0, line.now_s)
+    monkeypatch.setattr(line.exchange.checks, "is_late", lambda now_s: True)
+    monkeypatch.setattr(line.exchange.checks, "next_step", lambda now_s: STATUS)
+    line.exchange.set_voltage(next_v, line.now_s)
+    answer = line.device.reply(Accepted(4.0), to=SetVoltage(4.0))
+    line.written.clear()
+    line.exchange.on_bytes(answer, line.now_s + ROUND_TRIP_S)
+    line.exchange.tick(line.now_s + 4.0 * ROUND_TRIP_S)  # behind a sign of life, perhaps
+    asked = [one for data in line.written for one in line.device.receive(data, line.now_s)]
+    assert asked == [AskDevice(STATUS) if gives_way else SetVoltage(next_v)]
+
+
 @pytest.mark.parametrize("device", [DEVICE, "mcu-line"])
 def test_a_watchdog_that_watches_with_another_time_is_armed_anew(device: str) -> None:
     """Power was away for a moment, or somebody set it: it says armed, and would trip later than the rig was promised."""
