@@ -1,6 +1,7 @@
 """A thread that the machine refuses: told as from a disk, and what was refused is not done later either."""
 
 import asyncio
+import os
 import sys
 import threading
 import time
@@ -61,14 +62,17 @@ def test_what_is_asked_for_behind_the_end_is_refused_as_by_a_disk_and_never_done
 
 
 @pytest.fixture
-def own_switching() -> Iterator[None]:
-    before_s = sys.getswitchinterval()
-    sys.setswitchinterval(5e-3)  # as each Python begins
+def own_turns() -> Iterator[None]:
+    """As each process begins; a worker of the gate takes longer ones."""
+    before_s, policy = sys.getswitchinterval(), os.sched_getscheduler(0)
+    sys.setswitchinterval(5e-3)
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     yield
     sys.setswitchinterval(before_s)
+    os.sched_setscheduler(0, policy, os.sched_param(0))
 
 
-def test_work_that_calculates_does_not_hold_up_the_loop(own_switching: None) -> None:
+def test_work_that_calculates_does_not_hold_up_the_loop(own_turns: None) -> None:
     """Else it calculates for 5 ms more at each wake-up. Asked is what it has had of a processor meanwhile, which a busy machine
     does not change as it does the time that passes."""
 
