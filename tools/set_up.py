@@ -30,8 +30,10 @@ PIP: Final = (str(PYTHON), "-m", "pip", "--disable-pip-version-check", "--no-inp
 _LOOK_S: Final = 0.2
 _KEPT_LINES: Final = 30
 _COLLECTED: Final = re.compile(r"^(Collecting|Ignoring|Requirement already satisfied:)", re.MULTILINE)
-_NOT_COMPILED: Final = "/site-packages/(.*/)?(tests?|pip|setuptools|pkg_resources|mypyc?|lexers)/"
-"""What nobody imports: their own tests, who installs them, what is machine code already, all but one file of hundreds."""
+_RARELY_IMPORTED: Final = "async_api|cuda|dask|distributed|distutils|f2py|fontTools|standard_address_space|tornado"
+_NOT_COMPILED: Final = f"/site-packages/(.*/)?(tests?|pip|setuptools|pkg_resources|mypyc?|lexers|{_RARELY_IMPORTED})/"
+"""What nobody imports: their own tests, who installs them, what is machine code already, all but one file of hundreds; and what
+few do: Python compiles such a file when it is imported first."""
 _INSTALLING: Final = re.compile(r"^Installing collected packages: (.*)$", re.MULTILINE)
 
 
