@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.registers.words import State
-from tests.end_to_end.conftest import POLL_S, RunningGateway
+from tests.end_to_end.conftest import POLL_S, RunningGateway, start, stop
 
 ENABLE, RESET = 1, 2
 PRECONTACT = 7
@@ -94,18 +94,26 @@ def test_what_is_set_outlives_the_simulated_rig_and_nothing_is_set_by_halves(res
     assert_presses(rested, 10.0)
 
 
+@pytest.fixture(scope="module")
+def untaught(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
+    """A gateway that has held no force: by the pressures of one it would know what air to expect."""
+    started = start(tmp_path_factory.mktemp("wrong") / "state", "--sim")
+    yield started
+    stop(started)
+
+
 @pytest.fixture
-def healthy(rested: RunningGateway) -> Iterator[RunningGateway]:
+def healthy(untaught: RunningGateway) -> Iterator[RunningGateway]:
     """Heals what its test has broken."""
-    yield rested
-    sim(rested, "clear")
+    yield untaught
+    sim(untaught, "clear")
     deadline_s = time.monotonic() + 10.0
-    while rested.status()["state"] != State.OFF:
-        rested.write(0, 0, 0)
-        rested.write(0, RESET, 0)
-        assert time.monotonic() < deadline_s, rested.log.read_text()
+    while untaught.status()["state"] != State.OFF:
+        untaught.write(0, 0, 0)
+        untaught.write(0, RESET, 0)
+        assert time.monotonic() < deadline_s, untaught.log.read_text()
         time.sleep(0.05)
-    rested.write(PRECONTACT, 0)
+    untaught.write(PRECONTACT, 0)
 
 
 def provoked(gateway: RunningGateway, setting: str, force_n: float, code: str, precontact_n: float = 0.0) -> str:
