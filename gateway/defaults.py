@@ -73,3 +73,6 @@ LADDER_GROUPS: Final = 5
 LADDER_MINOR_POINTS: Final = 150
 LADDER_RESPONSE_STEPS: Final = 12
 QUICK_LADDER_STEP_V: Final = 0.5
+
+MOST_FRAMES: Final = 7
+"""Of a master, whose heartbeats the next control process is told."""

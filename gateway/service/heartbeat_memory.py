@@ -11,7 +11,9 @@ import os
 from collections.abc import Sequence
 from typing import Final
 
-_MOST_BEATS: Final = 7
+from gateway import defaults
+
+_MOST_BEATS: Final = 1 + defaults.MOST_FRAMES  # the register's own beside them
 _BYTES: Final = 8 * (1 + _MOST_BEATS)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from gateway.defaults import MOST_FRAMES
 from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.heartbeat_memory import HeartbeatMemory
@@ -53,7 +54,7 @@ def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heart
         ends[1].setblocking(False)
         guardian = GuardianLine(ends[1], HeartbeatMemory(memory))
         for tick, owner in enumerate(("10.0.0.5", "10.0.0.5", None, None)):
-            guardian.heartbeat(0.01 * tick, owner, range(tick, tick + 9))
+            guardian.heartbeat(0.01 * tick, owner, range(tick, tick + 10))
         told = [message_link.receive(ends[0]) for _ in range(2)]
         assert [message and message.body for message in told] == [{"owner": "10.0.0.5"}, {"owner": None}]
         guardian.close()
@@ -68,7 +69,9 @@ def test_the_guardian_is_told_who_owns_and_the_next_process_finds_its_last_heart
             line.close()
         return found
 
-    assert asyncio.run(next_one()) == (tuple(range(3, 10)), None), "of seven frames"
+    assert asyncio.run(next_one()) == (tuple(range(3, 3 + 1 + MOST_FRAMES)), None), (
+        "the last one, and those of its frames"
+    )
     os.close(memory)
 
 

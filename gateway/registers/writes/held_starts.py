@@ -9,8 +9,9 @@ on with the same heartbeat would begin when that reason is over, whatever its ot
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
+from gateway import defaults
 from gateway.registers.command import Channel
-from gateway.registers.writes.ownership import MOST_FRAMES, FrameBeats, keep_latest
+from gateway.registers.writes.ownership import FrameBeats, keep_latest
 
 _CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
@@ -142,7 +143,7 @@ class HeldEnables:
         """Add to the heartbeats with which a host was lost: of a program with several frames each brings its own."""
         known = self._lost_now.get(host, [])
         if fresh := [beat for beat in dict.fromkeys(beats) if beat not in known]:
-            keep_latest(self._lost_now, host, [*known, *fresh][-MOST_FRAMES:])
+            keep_latest(self._lost_now, host, [*known, *fresh][-defaults.MOST_FRAMES :])
             self.on_lost(dict(self._lost_now))
 
     def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:

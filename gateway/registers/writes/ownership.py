@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final, TypeVar
 
+from gateway import defaults
 from gateway.modbus.peer import NOBODY, Peer
 from gateway.registers.command import Channel
 
@@ -19,8 +20,6 @@ NOT_IPV4: Final = 0xFFFFFFFF
 LARGEST_SERIAL_PLACE: Final = 255
 """Serial faces are shown in owner_ip as 1 to 255: 0.0.0.0/8 holds no address of a host (RFC 1122, 3.2.1.3)."""
 
-MOST_FRAMES: Final = 7
-"""Frames of a program whose heartbeats the next process is told: the memory that they are told in has room for so many."""
 MOST_KNOWN: Final = 64
 """Masters that anything is known of: memory stays bounded whoever writes."""
 
@@ -118,7 +117,7 @@ class FrameBeats:
 
     def of(self, host: str | None) -> list[int]:
         """Return what the latest frames of a host have brought last."""
-        return [beat for channel, beat in self._last.items() if channel[0] == host][-MOST_FRAMES:]
+        return [beat for channel, beat in self._last.items() if channel[0] == host][-defaults.MOST_FRAMES :]
 
 
 class LastWriters:

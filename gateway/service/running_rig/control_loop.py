@@ -284,9 +284,8 @@ class ControlLoop:
         self.decision = decision
         if self.calibration_runs:
             self.calibration_runs.follow(decision)
-        if decision.release_owner or (
-            decision.clear_command and decision.fault
-        ):  # which takes the output from its owner
+        takes_output = decision.clear_command and bool(decision.fault)  # from its owner, who may have hung
+        if decision.release_owner or takes_output:
             self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)
         if decision.clear_command:
             self.bank.clear_command()
