@@ -108,4 +108,12 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(23.8204, "output", "deaf", (1.0,)),
         ],
     ),
+    (
+        201481,
+        [
+            Event(0.0299, "rival", "take", (19.01,), way="read_and_write"),
+            Event(1.2046, "output", "power", (0.0584, 0.0)),
+            Event(2.2923, "output", "replaced", (3.0, 0.9485), b"\r\n"),
+        ],
+    ),
 ]

@@ -13,6 +13,7 @@ from gateway.devices.device_checks.watchdog import WatchdogState
 from gateway.devices.messages import DeviceAnswer, DeviceStep
 
 _LOOK_PERIOD_S = 1.0  # between two looks at the watchdog: a device that was off for a moment has forgotten its arming
+_AGAIN_S, _LOOKS_AGAIN = 0.1, 2  # a look whose answer was lost is repeated soon, so often at most
 _WAITS_S = 0.5  # of a look for an idle wire: on a slow one a setpoint that never rests leaves none
 _STATES_PER_TIME = 9  # looks at the state for one at the time: an armed one may watch with another than ours
 _TRIES = 3  # of arming; then it does not arm
@@ -43,7 +44,8 @@ class DeviceChecks:
         known = self._known_of(DeviceStep.STATUS, DeviceStep.VERIFY)
         self._looks = deque((*_STATES_PER_TIME * known[:1], *known[1:]))
         self._tries = self._misses = 0
-        self._next_look_s = 0.0
+        self._next_look_s = self._looked_s = 0.0
+        self._unheard = 0
         self.fault = FaultCode.NONE
         self.said = self.unarmed = ""
         self.is_armed = self.is_tripped = self._is_said = False
@@ -60,7 +62,8 @@ class DeviceChecks:
         if self._waiting:
             return self._waiting[0]
         if self._looks and now_s >= self._next_look_s and self.fault in _GOES_ON:
-            self._next_look_s = now_s + _LOOK_PERIOD_S
+            self._looked_s, self._unheard = now_s, self._unheard + 1
+            self._next_look_s = now_s + (_AGAIN_S if self._unheard <= _LOOKS_AGAIN else _LOOK_PERIOD_S)
             if not self._is_said:
                 self._looks.rotate(-1)
             return self._looks[0]
@@ -68,7 +71,8 @@ class DeviceChecks:
 
     def is_late(self, now_s: float) -> bool:
         """Decide whether a question is due that has waited for an idle wire for long enough, or that arms the watchdog anew."""
-        is_look_late = bool(self._looks) and self.fault in _GOES_ON and now_s >= self._next_look_s + _WAITS_S
+        late_s = self._next_look_s + (0.0 if self._unheard else _WAITS_S)
+        is_look_late = bool(self._looks) and self.fault in _GOES_ON and now_s >= late_s
         return bool(self._waiting) or is_look_late
 
     def trip(self) -> None:
@@ -102,7 +106,7 @@ class DeviceChecks:
     def take(self, answer: DeviceAnswer) -> None:
         """Follow an answer."""
         is_due = bool(self._waiting) and self._waiting[0] is answer.step
-        self._misses = 0
+        self._note_heard()
         if is_due:
             self._waiting.popleft()
         if answer.step is DeviceStep.IDENTITY and not answer.is_right:
@@ -121,7 +125,7 @@ class DeviceChecks:
 
     def refuse(self, step: DeviceStep, words: str) -> None:
         """Follow a refusal in the device's own words."""
-        self._misses = 0
+        self._note_heard()
         if self._waiting and self._waiting[0] is step:
             self._waiting.popleft()
         if step is DeviceStep.IDENTITY:
@@ -132,6 +136,11 @@ class DeviceChecks:
         elif (step in _ARMS or (step is DeviceStep.STATUS and self._is_proof)) and not self.is_tripped:
             self._take_proof(is_armed=False, words=words)
         self._settle()
+
+    def _note_heard(self) -> None:
+        if self._unheard:
+            self._next_look_s = self._looked_s + _LOOK_PERIOD_S
+        self._misses = self._unheard = 0
 
     def miss(self, step: DeviceStep) -> None:
         """Follow a question that was not answered in its time. A device that has no words for it may not say so: else it would

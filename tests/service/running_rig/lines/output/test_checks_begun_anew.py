@@ -87,6 +87,17 @@ def test_a_look_that_is_not_answered_is_no_word_against_an_armed_watchdog(has_ve
     assert (checks.is_armed, checks.is_done, checks.fault) == (True, True, FaultCode.NONE)
 
 
+def test_a_look_whose_answer_was_lost_is_repeated_soon_and_twice_at_most() -> None:
+    """A device that was off has forgotten its arming, and the answer behind a lost one may be another question's: with a whole
+    period per look it pressed unwatched for three of them. A device without words for it is asked no more often for that."""
+    checks = checks_of_it(is_armed=True)
+    looks_s = [0.1 * tick for tick in range(50) if checks.next_step(0.1 * tick)]
+    assert looks_s == pytest.approx([0.0, 0.1, 0.2, 1.2, 2.2, 3.2, 4.2])
+    assert checks.is_late(5.2)
+    checks.take(DeviceAnswer(STATUS, is_right=True, text="armed"))
+    assert (checks.next_step(5.1), checks.next_step(5.2), checks.is_late(5.6)) == (None, STATUS, True)
+
+
 def test_what_was_never_armed_has_not_forgotten_it() -> None:
     """W249 says that the device was off meanwhile: not so where its first tries fail."""
     checks = checks_of_it()

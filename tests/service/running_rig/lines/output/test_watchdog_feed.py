@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from gateway.devices import output_device, output_host
-from gateway.devices.messages import Accepted, DeviceAnswer, DeviceStep, ReadVoltage, SetVoltage
+from gateway.devices.messages import Accepted, AskDevice, DeviceAnswer, DeviceStep, ReadVoltage, SetVoltage
 from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 
@@ -14,7 +14,7 @@ ROUND_TRIP_S = 0.003
 
 
 class FedLine:
-    """An output whose device answers each setting; written: what went out, and when."""
+    """An output whose device answers each setting and look; written: what went out, and when."""
 
     def __init__(self) -> None:
         profile = load_device("icpdas-702x")
@@ -33,7 +33,10 @@ class FedLine:
             self.now_s += ROUND_TRIP_S
             if self.written and self.written[-1][0] < self.now_s:
                 for asked in self.device.receive(self.written[-1][1], self.now_s):
-                    if isinstance(asked, SetVoltage | ReadVoltage) and self.exchange.unanswered_since_s is not None:
+                    if isinstance(asked, AskDevice):
+                        said = DeviceAnswer(asked.step, is_right=True, text="armed")
+                        self.exchange.on_bytes(self.device.reply(said, to=asked), self.now_s)
+                    elif isinstance(asked, SetVoltage | ReadVoltage) and self.exchange.unanswered_since_s is not None:
                         self.stands_v = asked.voltage_v if isinstance(asked, SetVoltage) else self.stands_v
                         self.exchange.on_bytes(self.device.reply(Accepted(self.stands_v), to=asked), self.now_s)
             voltage_v = (voltage_v + step_v) % 10.0
