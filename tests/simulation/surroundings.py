@@ -172,7 +172,8 @@ class Surroundings:
         now_s = self._outside.clock.now_s
         disturbed = [line for line, cable in CABLES.items() if cable.is_disturbed(now_s)]
         is_slow, is_dark = self.cell_pace != 1.0, now_s < self._dark_until_s + NOTICED_S
-        self.is_whole = not (disturbed or is_slow or is_dark)
+        port = CABLES["output"].port  # behind a plug that is back it opens a moment later
+        self.is_whole = port is not None and port.is_open and not (disturbed or is_slow or is_dark)
         if disturbed or self._pulled:
             for line in (*disturbed, *sorted(self._pulled)):
                 reasons.note(line, now_s)
