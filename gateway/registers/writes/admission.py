@@ -245,8 +245,8 @@ class Admission:
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
         may allow."""
-        if reason is RefusalReason.BYTE_ORDER_UNPROVEN or write.host in self.held_runs.by_host:
-            return  # its own proof, its own 0 are waited for
+        if reason is RefusalReason.BYTE_ORDER_UNPROVEN:
+            return  # its own proof is waited for
         offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])
         frame, asks = StartFrame(write.sender[1], (write.address, write.data)), CONTROL_WORD in offsets
         with suppress(Refusal):

@@ -54,16 +54,21 @@ class StartFrame(NamedTuple):
 
 class _Refused(NamedTuple):
     """What was refused last of a host. heartbeat: its own, as far as it has brought one (`beats`), else the one that stood;
-    at_s: when it came last, s."""
+    at_s: when it came last, s; sent: where and what each of its frames has written; is_let_go: somebody on that host has
+    written enable as 0 since."""
 
     frame: StartFrame
     heartbeat: int
     beats: bool
     at_s: float
+    sent: Mapping[Channel, tuple[int, bytes]]
+    is_let_go: bool = False
 
     def is_same(self, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new. Of who beats one without a heartbeat does not: the one that stands may be
         another's. Who is refused because another one owns is told to take over."""
+        if self.is_let_go:
+            return self.sent.get(frame.channel) == frame.data
         if frame.takes and not self.frame.takes:
             return False
         if frame.heartbeat is None and self.beats:
@@ -160,12 +165,16 @@ class HeldEnables:
         if frame.heartbeat is not None:
             self._frames.note(frame.channel, frame.heartbeat)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
-        keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s))
+        sent = {**(before.sent if before else {}), frame.channel: frame.data}
+        few = dict(list(sent.items())[-defaults.MOST_FRAMES :])
+        keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s, few))
 
     def _is_same(self, refused: _Refused, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new, beside what was refused last or behind itself."""
         is_as_before = frame.heartbeat is not None and self._frames.has_brought(frame.channel, frame.heartbeat)
-        return refused.is_same(frame) or (is_as_before and (refused.frame.takes or not frame.takes))
+        return refused.is_same(frame) or (
+            is_as_before and not refused.is_let_go and (refused.frame.takes or not frame.takes)
+        )
 
     def note_refused_beat(self, host: str, frame: StartFrame) -> None:
         """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""
@@ -183,7 +192,7 @@ class HeldEnables:
             return True
         if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
             return False
-        if now_s - refused.at_s >= _HELD_S:
+        if now_s - refused.at_s >= (_CYCLE_S if refused.is_let_go else _HELD_S):
             del self._refused[host]
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
@@ -216,10 +225,12 @@ class HeldEnables:
             del self._refused[host]
 
     def let_go(self, host: str) -> None:
-        """Note that a host has written enable as 0."""
+        """Note that a host has written enable as 0. What was refused, and comes again as soon as only a cycle does, is of a
+        program beside the one that wrote this."""
         self._find(host)
         self._forget(host)
-        self._refused.pop(host, None)
+        if refused := self._refused.get(host):
+            self._refused[host] = refused._replace(is_let_go=True)
 
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""

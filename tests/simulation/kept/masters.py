@@ -77,4 +77,23 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(6.8268, "machine", "kill", (0.1, 0.0)),
         ],
     ),
+    (
+        201879,
+        [
+            Event(7.7441, "rival", "take", (8.92,)),
+            Event(10.0579, "rival", "hang", (35404.0,)),
+            Event(10.2835, "machine", "kill", (0.1, 0.0)),
+            Event(10.3753, "worker", "take", (26.37,)),
+            Event(12.4556, "rival", "ask", (0,), b"\x10\x00\x00\x00\x01\x02\x00\x00"),
+        ],
+    ),
+    (
+        202968,
+        [
+            Event(9.9606, "rival", "self_test"),
+            Event(13.6824, "rival", "take", (38.03,)),
+            Event(15.714, "rival", "hang", (48229.0,)),
+            Event(15.947, "worker", "calibrate"),
+        ],
+    ),
 ]

@@ -1,15 +1,17 @@
 """A master with more than one frame, or connection: what each brings counts by itself."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from struct import pack
 
 import pytest
 
 from gateway.codes.refusals import RefusalReason
+from gateway.control.settings import SelfTestSettings
 from gateway.modbus import Peer
 from gateway.registers.words import State
 from tests.control.bench import settings
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, TARE, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, SELF_TEST, TAKE, TARE, SmallRig
 
 LEASE_S, CYCLE_S = 0.35, 0.05
 FIRST, SECOND = 139, 9
@@ -80,3 +82,49 @@ def test_a_tare_is_taken_again_by_no_second_frame_that_stands_still() -> None:
         answers.append(rig.run(CYCLE_S).answer(0, TARE, 0, 0, 0, FIRST))
         rig.write(4, SECOND)
     assert all(answers[2:])
+
+
+@pytest.mark.parametrize("is_split", [False, True])
+def test_a_stop_on_the_host_of_a_hung_program_lets_none_of_its_frames_begin(is_split: bool) -> None:
+    """They had been refused for as long as they came: the 0 of somebody beside it on that host was taken for its own, and its
+    next frame pressed. Who comes again behind a pause has ended and begins."""
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    rig.beats = False
+
+    def flow(cycles: int) -> list[RefusalReason | None]:
+        answers = []
+        for _ in range(cycles):
+            refused = rig.answer(0, ENABLE, 3000, 0, 0, FIRST, peer=OTHER)
+            answers.append(refused.reason if refused else None)
+            if is_split:
+                rig.answer(4, SECOND, peer=OTHER)
+            rig.run(CYCLE_S)
+        return answers
+
+    rig.write(0, ENABLE, 800, 0, 0, 1)
+    flow(3)
+    rig.write(0, 0, 0, 0, 0, 2)
+    flow(3)
+    rig.write(0, 0, peer=Peer(OTHER.host, OTHER.port + 1))
+    began = len(rig.trace)
+    assert flow(20) == [RefusalReason.HEARTBEAT_STALE] * 20
+    assert max(force_n for _, _, force_n in rig.trace[began + 50 :]) < 1.0
+    rig.run(3.1).write(0, ENABLE, 3000, 0, 0, FIRST, peer=OTHER)
+    assert rig.run(0.1).state is not State.OFF
+
+
+def test_who_was_refused_while_a_run_s_bit_was_kept_begins_nothing_by_frames_without_that_bit() -> None:
+    """The bit's own 0 is waited for; of other frames nothing was noted, and they began when their reason was over."""
+    rig = SmallRig(replace(settings(lease_s=LEASE_S), self_test=SelfTestSettings()))
+    rig.run(1.0).write(0, SELF_TEST, 0, 0, 0, 1, peer=OTHER)
+    rig.until(State.CALIBRATING).write(0, SELF_TEST, 0, 0, 0, 2, peer=OTHER)
+    rig.run(0.1).write(0, 0)
+    rig.until(State.OFF, 10.0).beats = False
+    rig.is_cell_silent = True
+    rig.run(1.0)
+    for _ in range(5):
+        assert rig.run(CYCLE_S).answer(0, ENABLE, 3000, 0, 0, FIRST, peer=OTHER)
+    rig.is_cell_silent = False
+    rig.run(0.3)
+    refused = rig.answer(0, ENABLE, 3000, 0, 0, FIRST, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
