@@ -266,7 +266,7 @@ class Simulation:
 
     def _on_death(self) -> None:
         self.status.forget_owner()
-        self.lease.forget(is_all=not self.service.is_guarded)
+        self.lease.forget(self.clock.now_s, is_all=not self.service.is_guarded)
         self.target.forget()
         self.observer.note_death(self.clock.now_s, CABLES["output"].through_s)
         self._lose_control()

@@ -34,6 +34,8 @@ class LeaseJudge:
         self._renewed_s = -inf
         self._brought: dict[Frame, float] = {}
         """Of each master's frames the last heartbeat."""
+        self._first_s: dict[Frame, float] = {}
+        """When each of them came first."""
         self._shown: dict[Frame, float] = {}
         """The same, of those that were refused, too."""
         self._took: set[str] = set()
@@ -65,6 +67,7 @@ class LeaseJudge:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
             self._holder = host if self._is_enabled else ""
         if beat is not None:
+            self._first_s.setdefault(frame, now_s)
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
 
     def note_start(self, pdu: bytes, now_s: float, *, is_taken: bool, host: str) -> None:
@@ -99,13 +102,19 @@ class LeaseJudge:
         if self._observer.disabled_s is not None and self._observer.bounds.lease_s < inf:
             self._observer.complain("I7 left frame", f"{frame[0]} began by a frame of before the death", now_s)
 
-    def forget(self, *, is_all: bool = False) -> None:
-        """Another process does not know what was refused once, nor what each frame brought, but for the holder's; is_all: not
-        of those either, for the guardian is another one."""
-        left = {frame: beat for frame, beat in self._brought.items() if frame[0] == self._holder}
+    def forget(self, died_s: float, *, is_all: bool = False) -> None:
+        """Another process does not know what was refused once, nor what each frame brought, but for those of the holder that
+        had come before the last tick, which tells of them; is_all: not of those either, for the guardian is another one."""
+        told_s = died_s - 2.0 * self._observer.bounds.period_s
+        left = {
+            frame: beat
+            for frame, beat in self._brought.items()
+            if frame[0] == self._holder and self._first_s[frame] < told_s
+        }
         self._left = {} if is_all else left or self._left
         self._refused.clear()
         self._brought.clear()
+        self._first_s.clear()
         self._shown.clear()
 
     def note_local_run(self, now_s: float) -> None:
