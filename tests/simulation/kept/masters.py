@@ -96,4 +96,14 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(15.947, "worker", "calibrate"),
         ],
     ),
+    (
+        208781,
+        [
+            Event(6.4245, "load_cell", "pull"),
+            Event(9.4124, "worker", "take", (42.97,)),
+            Event(10.2239, "worker", "hang", (38068.0,)),
+            Event(10.8173, "load_cell", "push"),
+            Event(12.1441, "worker", "disconnect"),
+        ],
+    ),
 ]

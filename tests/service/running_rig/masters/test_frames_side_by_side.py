@@ -49,6 +49,20 @@ def test_two_frames_of_one_master_keep_a_force_up_only_where_one_of_them_changes
     assert rig.state is (State.HOLDING if counts else State.FAULT)
 
 
+@pytest.mark.parametrize("beats", ["stand still", "count", "toggle"])
+def test_a_master_that_connects_for_each_frame_keeps_a_force_up_only_where_one_of_them_changes(beats: str) -> None:
+    """The first frame of a connection brought another heartbeat than the register's: one that hung pressed for ever."""
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    rig.beats = False
+    for cycle in range(40):
+        beat = FIRST + {"stand still": 0, "count": cycle, "toggle": cycle % 2}[beats]
+        if rig.state is not State.FAULT:
+            rig.write(0, ENABLE, 1200, 0, 0, beat, peer=Peer(OWNER.host, 5000 + cycle))
+            rig.run(CYCLE_S).write(4, SECOND, peer=Peer(OWNER.host, 6000 + cycle))
+        rig.run(CYCLE_S)
+    assert rig.state is (State.FAULT if beats == "stand still" else State.HOLDING)
+
+
 @pytest.mark.parametrize("takes", [0, TAKE])
 @pytest.mark.parametrize("why", ["a silent cell", "another owner"])
 def test_what_was_refused_begins_not_by_a_second_frame_that_stands_still(why: str, takes: int) -> None:
