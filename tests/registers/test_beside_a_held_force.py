@@ -7,12 +7,10 @@ import pytest
 from gateway.codes.refusals import RefusalReason
 from gateway.registers import Status
 from gateway.registers.words import ControlBit, State
-from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
+from gateway.registers.writes.proposed_write import ProposedWrite
 from tests.calibrations.coefficients import calibration
 
-ENABLE, TAKE, PULL, TARE = (
-    int(bit) for bit in (ControlBit.ENABLE, ControlBit.TAKE_OWNERSHIP, ControlBit.VALVE_PULL, ControlBit.TARE)
-)
+ENABLE, TAKE, PULL = (int(bit) for bit in (ControlBit.ENABLE, ControlBit.TAKE_OWNERSHIP, ControlBit.VALVE_PULL))
 
 
 @pytest.mark.parametrize("word", [ENABLE, ENABLE | PULL])
@@ -87,23 +85,3 @@ def test_another_s_stop_is_remembered_with_the_owner_s_last_heartbeat_and_its_ow
     owner.write(0, 1)
     other.write(0, 0)
     assert lost == [{"10.0.0.1": [5]}]
-
-
-def test_a_beat_that_came_with_a_refused_tare_is_one_while_a_force_is_held(make_bank, master_of) -> None:
-    """The robot's next frame brings it again without the tare: as a beat that was none the lease would run out on it."""
-    bank = make_bank(has_lease=True)
-    master = master_of(bank, "10.0.0.1")
-
-    def decide(proposal: ProposedWrite) -> EdgeRefusal | None:
-        asks = proposal.command.control_word & ControlBit.TARE
-        return EdgeRefusal(RefusalReason.TARE_REFUSED, ControlBit.TARE, "a force is held") if asks else None
-
-    bank.on_asked = decide
-    master.write(0, ENABLE, 1200, 300, 0, 7)
-    assert master.refusal(master.write, 0, ENABLE | TARE, 1200, 300, 0, 8).reason is RefusalReason.TARE_REFUSED
-    master.write(0, ENABLE, 1200, 300, 0, 8)
-    assert (bank.command.heartbeat, bank.command.repeats) == (8, False)
-    master.write(0, 0, 0, 0, 0, 9)
-    assert master.refusal(master.write, 0, ENABLE | TARE, 1200, 300, 0, 10).reason is RefusalReason.TARE_REFUSED
-    master.write(0, ENABLE, 1200, 300, 0, 10)
-    assert bank.command.repeats, "with nothing held it is what the refused frame has brought"

@@ -1,0 +1,47 @@
+"""What counts as a heartbeat of a program that goes on: one that came first with a write that was refused does not, unless it
+holds a force."""
+
+from collections.abc import Callable
+
+from gateway.codes.refusals import RefusalReason
+from gateway.registers.words import ControlBit
+from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
+
+ENABLE, TARE = ControlBit.ENABLE, ControlBit.TARE
+
+
+def _refuse(bit: ControlBit, reason: RefusalReason) -> Callable[[ProposedWrite], EdgeRefusal | None]:
+    return lambda write: EdgeRefusal(reason, bit, "not now") if write.command.control_word & bit else None
+
+
+def test_a_beat_that_came_with_a_refused_tare_is_one_while_a_force_is_held(make_bank, master_of) -> None:
+    """The robot's next frame brings it again without the tare: as a beat that was none the lease would run out on it."""
+    bank = make_bank(has_lease=True)
+    master = master_of(bank, "10.0.0.1")
+
+    bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
+    master.write(0, ENABLE, 1200, 300, 0, 7)
+    assert master.refusal(master.write, 0, ENABLE | TARE, 1200, 300, 0, 8).reason is RefusalReason.TARE_REFUSED
+    master.write(0, ENABLE, 1200, 300, 0, 8)
+    assert (bank.command.heartbeat, bank.command.repeats) == (8, False)
+    master.write(0, 0, 0, 0, 0, 9)
+    assert master.refusal(master.write, 0, ENABLE | TARE, 1200, 300, 0, 10).reason is RefusalReason.TARE_REFUSED
+    master.write(0, ENABLE, 1200, 300, 0, 10)
+    assert bank.command.repeats, "with nothing held it is what the refused frame has brought"
+
+
+def test_a_start_with_the_heartbeat_of_another_frame_that_was_refused_behind_it_begins_nothing(
+    make_bank, master_of
+) -> None:
+    """Of a program with a frame for its start and one for its tare: both stand still with the same heartbeat."""
+    bank = make_bank(has_lease=True)
+    master = master_of(bank, "10.0.0.1")
+    bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
+    master.write(4, 1)
+    assert master.refusal(master.write, 0, ENABLE, 1200, 0, 0, 2).reason is RefusalReason.NOT_READY
+    bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
+    assert master.refusal(master.write, 0, TARE, 0, 0, 0, 3).reason is RefusalReason.TARE_REFUSED
+    master.write(0, ENABLE, 1200, 0, 0, 3)
+    assert bank.command.repeats, "its tare had brought this heartbeat"
+    master.write(0, ENABLE, 1200, 0, 0, 4)
+    assert not bank.command.repeats, "its program goes on"
