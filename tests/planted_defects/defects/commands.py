@@ -87,4 +87,7 @@ DEFECTS = (
     Defect("what is written right behind the gateway's own end is taken", "control/readiness.py",
            "ramps_down=machine.is_ramping_down or machine.is_stopping", "ramps_down=machine.is_ramping_down",
            ("control/test_between_two_steps.py",)),
+    Defect("who is asked before a run is not told of the payload's weight", "control/runs/active_run.py",
+           "pressed_n = self.model.force_n(voltage_v, 1.0) + max(0.0, self._given_n())",
+           "pressed_n = self.model.force_n(voltage_v, 1.0)", ("control/runs/test_active_run.py",)),
 )  # fmt: skip
