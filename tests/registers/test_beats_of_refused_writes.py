@@ -45,3 +45,14 @@ def test_a_start_with_the_heartbeat_of_another_frame_that_was_refused_behind_it_
     assert bank.command.repeats, "its tare had brought this heartbeat"
     master.write(0, ENABLE, 1200, 0, 0, 4)
     assert not bank.command.repeats, "its program goes on"
+
+
+def test_an_enable_that_waited_for_its_proof_of_the_byte_order_begins_with_the_same_heartbeat(make_bank, master_of):
+    """What was refused for want of the proof is sent again behind it, as every client does, and in the same cycle."""
+    bank = make_bank(has_lease=True, require_byte_order_echo=True)
+    master = master_of(bank, "10.0.0.1")
+    refusal = master.refusal(master.write, 0, int(ENABLE), 1200, 0, 0, 2)
+    assert refusal.reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    master.write_float(416, 1234.5)
+    master.write(0, int(ENABLE), 1200, 0, 0, 2)
+    assert (bank.command.control_word, bank.command.repeats) == (ENABLE, False)
