@@ -101,6 +101,22 @@ def test_the_slowest_exchange_is_the_slowest_wherever_it_was() -> None:
     assert "the slowest within 80 ms of 100 ms" in watch.findings(RIG, 1.0)[0].text
 
 
+def test_a_reading_that_waited_behind_another_is_counted_beside_it_and_no_reading_beside_itself() -> None:
+    """Of 100 readings a second one tick has taken two."""
+    watch, heard = LineWatch(), 0
+    for k in range(60):
+        heard += 2 if k == 30 else 1
+        watch.observe(LineStatus(cell_counts=WireCounts(0, heard, 0)))
+        watch.note_reading(0.01 * heard)
+    assert "100 readings per second, 0 missing, 0 unreadable, longest gap 10 ms" in watch.findings(RIG, 1.0)[1].text
+
+
+@pytest.mark.parametrize(("weight_n", "rest_n"), [(5.0, 1.5), (-5.0, -1.5)])
+def test_a_payload_excuses_a_force_at_rest_on_the_side_to_which_it_hangs_and_on_no_other(weight_n, rest_n) -> None:
+    assert judge_zero(rest_n, RIG, weight_n).verdict is FAILED
+    assert judge_zero(-rest_n, RIG, weight_n).verdict is PASSED
+
+
 @pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])
 @pytest.mark.parametrize("item", Item)
 def test_a_self_test_is_as_good_as_its_worst_item(item: Item, verdict: SelfTestVerdict) -> None:

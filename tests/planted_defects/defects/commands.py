@@ -90,4 +90,11 @@ DEFECTS = (
     Defect("who is asked before a run is not told of the payload's weight", "control/runs/active_run.py",
            "pressed_n = self.model.force_n(voltage_v, 1.0) + max(0.0, self._given_n())",
            "pressed_n = self.model.force_n(voltage_v, 1.0)", ("control/runs/test_active_run.py",)),
+    Defect("the way to a stair of a slow plant takes longer than the stair", "control/runs/stair_approach.py",
+           "return min(LONGEST_S, PEAKS * median(self._peaks_s))", "return PEAKS * median(self._peaks_s)",
+           ("control/runs/test_stair_approach.py",)),
+    Defect("a payload excuses a zero that is off to the other side", "control/self_test/judgement.py",
+           "most_n = kept_n + max(-weight_n, 0.0)", "most_n = kept_n + abs(weight_n)", ("control/self_test/test_verdicts.py",)),
+    Defect("a self-test counts each reading twice", "control/self_test/line_watch.py",
+           "max(0, self._heard - before - 1)", "max(0, self._heard - before)", ("control/self_test/test_verdicts.py",)),
 )  # fmt: skip
