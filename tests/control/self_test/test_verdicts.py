@@ -30,7 +30,7 @@ from gateway.control.self_test.judgement import (
 )
 from gateway.control.self_test.line_watch import LineWatch
 from gateway.control.self_test.measurements import Slope, intervals_of
-from gateway.control.self_test.rest import judge_rest
+from gateway.control.self_test.rest import judge_rest, why_no_force
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from tests.control.bench import bsfm, settings
@@ -115,6 +115,16 @@ def test_a_reading_that_waited_behind_another_is_counted_beside_it_and_no_readin
 def test_a_payload_excuses_a_force_at_rest_on_the_side_to_which_it_hangs_and_on_no_other(weight_n, rest_n) -> None:
     assert judge_zero(rest_n, RIG, weight_n).verdict is FAILED
     assert judge_zero(-rest_n, RIG, weight_n).verdict is PASSED
+
+
+@pytest.mark.parametrize(("rest_n", "why"), [(2.0, "the zero is off: tare first"), (-2.0, ""), (0.0, "")])
+def test_a_force_is_tried_behind_a_zero_that_is_off_below_nothing_for_it_may_be_the_sign(
+    rest_n: float, why: str
+) -> None:
+    rest = [(0.01 * k, rest_n + 0.05 * (-1) ** k) for k in range(100)]
+    found = {one.item: one for one in judge_rest(rest, MEASURED)}
+    assert (found[Item.ZERO].verdict is FAILED) is (rest_n != 0.0)
+    assert why_no_force(found, rest, MEASURED) == why
 
 
 @pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])
