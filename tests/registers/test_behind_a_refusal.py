@@ -1,5 +1,5 @@
-"""What counts as a heartbeat of a program that goes on: one that came first with a write that was refused does not, unless it
-holds a force."""
+"""What a refused write leaves behind: its heartbeat is none of a program that goes on, unless that holds a force; and only what
+was refused as a start is held against the next one."""
 
 from collections.abc import Callable
 
@@ -56,3 +56,20 @@ def test_an_enable_that_waited_for_its_proof_of_the_byte_order_begins_with_the_s
     master.write_float(416, 1234.5)
     master.write(0, int(ENABLE), 1200, 0, 0, 2)
     assert (bank.command.control_word, bank.command.repeats) == (ENABLE, False)
+
+
+def test_a_run_that_was_refused_over_a_fault_holds_up_no_enable_behind_its_reset(make_bank, master_of) -> None:
+    """Only an enable that was kept at 1 over the fault would press by the reset alone."""
+    for bit, is_held in ((ControlBit.START_SELF_TEST, False), (ENABLE, True)):
+        bank = make_bank(has_lease=True, supported_bits=ControlBit(127))
+        master = master_of(bank, "10.0.0.1")
+        bank.on_asked = _refuse(bit, RefusalReason.FAULT_LATCHED)
+        master.write(4, 1)
+        assert master.refusal(master.write, 0, int(bit), 0, 0, 0, 2).reason is RefusalReason.FAULT_LATCHED
+        bank.on_asked = lambda write: None
+        master.write(4, 3)
+        if is_held:
+            assert master.refusal(master.write, 0, int(ENABLE)).reason is RefusalReason.CALIBRATION_HELD
+        else:
+            master.write(0, int(ENABLE))
+            assert bank.command.control_word == ENABLE
