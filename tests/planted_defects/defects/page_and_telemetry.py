@@ -73,4 +73,7 @@ DEFECTS = (
     Defect("the error of a rise is that of a fall", "web/static/live/error.js",
            'step_n > 0 ? "rising" : "falling"', 'step_n < 0 ? "rising" : "falling"',
            ("web/tabs/in_chromium/test_figures_in_chromium.py",)),
+    Defect("a broker's refusal counts with its short connections", "telemetry/mqtt/broker_connection.py",
+           "self._is_away, self._refused, self._short = True, reason, 0", "self._is_away, self._refused = True, reason",
+           ("telemetry/mqtt/test_lost_broker.py",)),
 )  # fmt: skip

@@ -131,4 +131,10 @@ DEFECTS = (
            "                    blocks.append(np.array(rows, dtype=np.float64))\n                    rows = []",
            "                    rows = rows[-1:]",
            ("recording/tables/test_heads_of_tables.py",)),
+    Defect("a backup that is damaged at its end is restored", "cli/state_archive.py",
+           "        _read_to_the_end(source)\n        with", "        with", ("cli/test_state_archive.py",)),
+    Defect("what is restored can be written by everybody", "cli/state_archive.py",
+           "_MOST_MODE: Final = 0o744", "_MOST_MODE: Final = 0o777", ("cli/test_state_archive.py",)),
+    Defect("everybody may look into a restored state", "cli/state_archive.py",
+           "        fresh.chmod(0o700)\n", "", ("cli/test_state_archive.py",)),
 )  # fmt: skip
