@@ -100,4 +100,6 @@ DEFECTS = (
     Defect("a wrong sign is never tried for", "control/self_test/rest.py",
            "if found[Item.ZERO].verdict is FAILED and mean_n(rest) > 0.0:", "if found[Item.ZERO].verdict is FAILED:",
            ("control/self_test/test_verdicts.py",)),
+    Defect("a self-test counts readings from when its tick saw them", "control/self_test/self_test_run.py",
+           "at_s = now_s - reading.age_s", "at_s = now_s", ("control/self_test/test_stages.py",)),
 )  # fmt: skip
