@@ -151,4 +151,12 @@ DEFECTS = (
     Defect("letters of a person's text are lost in the C code", "bsfm/c_export/code.py",
            ".encode(\"ascii\", \"backslashreplace\")", ".encode(\"ascii\", \"ignore\")",
            ("bsfm/c_export/test_c_export.py",)),
+    Defect("a stair on which the recording has ended counts as settled", "bsfm/ladder/labels.py",
+           " and stairs[-1] < self.last_stair", "", ("bsfm/ladder/test_labels.py",)),
+    Defect("steps for the response are turns of the walk", "bsfm/ladder/labels.py",
+           "return whole[~np.isin(whole, self.stair[self.group == RESPONSE_GROUP])]", "return whole",
+           ("bsfm/ladder/test_labels.py",)),
+    Defect("the walk does not say where it began", "bsfm/ladder/labels.py",
+           "[*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk", "walk",
+           ("bsfm/ladder/test_labels.py",)),
 )  # fmt: skip
