@@ -74,4 +74,7 @@ DEFECTS = (
     Defect("kilograms in capitals are no unit", "devices/force_reading.py",
            "\"kgF\", \"KGF\"), \"kg\")", "\"kgF\"), \"kg\")",
            ("devices/test_units_beside_blanks.py",)),
+    Defect("a simulated amplifier takes its zero's counts for newtons", "devices/binary/hbm_cell.py",
+           "raw = force_n / self._newton_per_unit + self._reading.zero_count",
+           "raw = (force_n + self._reading.zero_count) / self._newton_per_unit", ("devices/cells/test_binary_cells.py",)),
 )  # fmt: skip
