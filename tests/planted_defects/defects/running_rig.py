@@ -166,4 +166,7 @@ DEFECTS = (
            ("service/fitting/test_fit_launcher.py",)),
     Defect("half an hour behind a fit another process is killed", "service/running_rig/fit_launcher.py",
            "        self._patience.cancel()\n", "", ("service/fitting/test_fit_launcher.py",)),
+    Defect("all that a rig's process has ever waited is one pause", "service/running_rig/lateness.py",
+           "waited_s = min(turns.waited_s - known.waited_s, now_s - self._rig_ran_s)",
+           "waited_s = min(turns.waited_s, now_s - self._rig_ran_s)", ("service/running_rig/test_lateness.py",)),
 )  # fmt: skip
