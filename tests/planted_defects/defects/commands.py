@@ -102,4 +102,12 @@ DEFECTS = (
            ("control/self_test/test_verdicts.py",)),
     Defect("a self-test counts readings from when its tick saw them", "control/self_test/self_test_run.py",
            "at_s = now_s - reading.age_s", "at_s = now_s", ("control/self_test/test_stages.py",)),
+    Defect("what is held for a lost master rises by a newton without a beat", "control/edge_checks.py",
+           "force_n > at.held_n + _ROUNDED_N", "force_n > at.held_n + 1.0", ("control/commands/test_edge_checks.py",)),
+    Defect("a voltage that stood without a meaning acts without a beat", "control/edge_checks.py",
+           "before.voltage_setpoint_v if before.mode is Mode.VOLTAGE else 0.0", "before.voltage_setpoint_v",
+           ("control/commands/test_edge_checks.py",)),
+    Defect("at rest a gateway that ends says that a force goes down", "control/edge_checks.py",
+           "if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):",
+           "if not is_calibrating and not at.ramps_down:", ("control/commands/test_edge_checks.py",)),
 )  # fmt: skip
