@@ -86,4 +86,7 @@ DEFECTS = (
            "if why == \"exit-code\" else \"\"", "if why else \"\"", ("cli/system_service/test_service.py",)),
     Defect("two values of one day make a trend", "fleet/trend.py",
            " or len(set(days)) < len(x)", "", ("fleet/test_drift.py",)),
+    Defect("a port that may not be opened is told as a device that is away", "cli/errors.py",
+           "return CliError(str(error), getattr(error, \"exit_code\", exit_codes.DEVICE))",
+           "return CliError(str(error), exit_codes.DEVICE)", ("cli/test_exit_codes.py",)),
 )  # fmt: skip
