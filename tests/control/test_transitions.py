@@ -32,7 +32,7 @@ class Parts:
         )  # fmt: skip
         commands = SimpleNamespace(
             who="10.0.0.1", start_lease=lambda now_s: note("lease"), expect_clearing=lambda: note("clearing"),
-            has_moved=has_moved,
+            has_moved=has_moved, let_no_beat_count=lambda: note("no beat counts"),
         )  # fmt: skip
         parts: Any = ControllerParts(
             commands,  # type: ignore[arg-type]
@@ -72,6 +72,22 @@ def test_the_first_fault_stays_whatever_breaks_behind_it() -> None:
     parts = enabled()
     parts.machine.fail_internally(3.0)
     assert (parts.machine.state, parts.machine.fault, parts.machine.faulted_s) == (State.FAULT, FaultCode.INTERNAL, 3.0)
+
+
+def test_a_reset_of_a_fault_acknowledges_a_restart() -> None:
+    parts = Parts()
+    parts.machine.fail(2.0, STALE)
+    assert parts.machine.is_restarted, "by itself it does not"
+    parts.machine.reset()
+    assert (parts.machine.state, parts.machine.fault) == (State.OFF, FaultCode.NONE)
+    assert not parts.machine.is_restarted
+
+
+def test_at_the_end_of_a_way_to_0_no_beat_of_before_counts_any_more() -> None:
+    """What was written on that way with enable at 1 would be a rise behind it."""
+    parts = enabled()
+    parts.machine.end_ramp()
+    assert parts.did == ["no beat counts", "loop.rest", "run.rest", "clearing"]
 
 
 def test_a_reset_in_off_is_the_device_s_alone_and_acknowledges_no_restart() -> None:

@@ -121,4 +121,10 @@ DEFECTS = (
            ("control/supervision/test_lease.py",)),
     Defect("who has beaten since its takeover counts as hung at the next", "control/supervision/lease.py",
            "            self._unbeaten.pop(who, None)\n", "", ("control/supervision/test_lease.py",)),
+    Defect("a reset acknowledges no restart", "control/transitions.py",
+           "self.fault, self.is_restarted = FaultCode.NONE, False", "self.fault = FaultCode.NONE",
+           ("control/test_transitions.py",)),
+    Defect("what was written on a way to 0 begins behind it", "control/transitions.py",
+           "        self.parts.commands.let_no_beat_count()\n        self.disable(\"force", "        self.disable(\"force",
+           ("control/test_transitions.py",)),
 )  # fmt: skip
