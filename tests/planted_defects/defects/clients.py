@@ -43,4 +43,7 @@ DEFECTS = (
     Defect("the answer to a question that was broken off is taken for the next one's", "cli/master/client.py",
            "            self.close()  # its answer is still to come, and is none to what is asked next\n            raise",
            "            raise", ("cli/master/test_sent_once.py",)),
+    Defect("who types an upload in is told the halves of a float the wrong way round", "cli/master/upload_frames.py",
+           "(\" high word\", \" low word\")[place]", "(\" low word\", \" high word\")[place]",
+           ("cli/master/test_upload_listing.py",)),
 )  # fmt: skip

@@ -110,4 +110,7 @@ DEFECTS = (
     Defect("at rest a gateway that ends says that a force goes down", "control/edge_checks.py",
            "if not is_calibrating and not (at.ramps_down and at.state in ENABLED_STATES):",
            "if not is_calibrating and not at.ramps_down:", ("control/commands/test_edge_checks.py",)),
+    Defect("the heartbeat of a frame that was refused renews the lease", "control/command_edges.py",
+           "        if command.has_waited or command.repeats:", "        if command.has_waited:",
+           ("control/commands/test_command_edges.py",)),
 )  # fmt: skip

@@ -116,4 +116,7 @@ DEFECTS = (
            "response_s = max(_SHORTEST_S, supervision.response_lag_s + self.more_s)",
            "response_s = supervision.response_lag_s + self.more_s",
            ("control/compensation/test_bounds_of_compensation.py",)),
+    Defect("what quick calls leave of a ramp is lost", "control/limits.py",
+           "most_s = TICK_S if dt_s <= TICK_S else min(dt_s, self._longest_step_s)",
+           "most_s = min(dt_s, self._longest_step_s)", ("control/test_limits.py",)),
 )  # fmt: skip

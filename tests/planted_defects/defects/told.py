@@ -89,4 +89,7 @@ DEFECTS = (
     Defect("a port that may not be opened is told as a device that is away", "cli/errors.py",
            "return CliError(str(error), getattr(error, \"exit_code\", exit_codes.DEVICE))",
            "return CliError(str(error), exit_codes.DEVICE)", ("cli/test_exit_codes.py",)),
+    Defect("the last setpoint is told as the largest", "recording/care/what_happened.py",
+           "most_setpoint_n=float(setpoints.max())", "most_setpoint_n=float(setpoints[-1])",
+           ("recording/care/test_what_happened.py",)),
 )  # fmt: skip
