@@ -127,4 +127,7 @@ DEFECTS = (
     Defect("what was written on a way to 0 begins behind it", "control/transitions.py",
            "        self.parts.commands.let_no_beat_count()\n        self.disable(\"force", "        self.disable(\"force",
            ("control/test_transitions.py",)),
+    Defect("a gateway that ends is enabled once more", "control/readiness.py",
+           "        if self._machine.is_stopping:\n            return RefusalReason.NOT_READY\n", "",
+           ("control/test_controller.py",)),
 )  # fmt: skip
