@@ -159,4 +159,7 @@ DEFECTS = (
     Defect("the walk does not say where it began", "bsfm/ladder/labels.py",
            "[*range(walk[0] - 1, walk[0]), *walk] if walk and walk[0] > 0 else walk", "walk",
            ("bsfm/ladder/test_labels.py",)),
+    Defect("the question of a pressure takes no time on the wire", "profiles/rigs/checks/wire_times.py",
+           "took_s.get(\"read_pressure\", took_s.get(\"read_voltage\", 0.0))", "took_s.get(\"read_voltage\", 0.0)",
+           ("profiles/rigs/test_wire_checks.py",)),
 )  # fmt: skip
