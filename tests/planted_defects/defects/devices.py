@@ -77,4 +77,7 @@ DEFECTS = (
     Defect("a simulated amplifier takes its zero's counts for newtons", "devices/binary/hbm_cell.py",
            "raw = force_n / self._newton_per_unit + self._reading.zero_count",
            "raw = (force_n + self._reading.zero_count) / self._newton_per_unit", ("devices/cells/test_binary_cells.py",)),
+    Defect("a step of the twin in which a command arrives has the sum of both pressures", "twin/regulator.py",
+           "            total += (moment - at) * self._advance(", "            total += self._advance(",
+           ("twin/test_regulator.py",)),
 )  # fmt: skip
