@@ -80,4 +80,7 @@ DEFECTS = (
     Defect("a step of the twin in which a command arrives has the sum of both pressures", "twin/regulator.py",
            "            total += (moment - at) * self._advance(", "            total += self._advance(",
            ("twin/test_regulator.py",)),
+    Defect("a clock's offset does not go with its skew", "twin/load_cell.py",
+           "(time_s - cell.clock_offset_s) * (1.0 - cell.clock_skew)",
+           "time_s * (1.0 - cell.clock_skew) - cell.clock_offset_s", ("twin/effects/test_effects.py",)),
 )  # fmt: skip
