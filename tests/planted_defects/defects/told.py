@@ -83,7 +83,7 @@ DEFECTS = (
     Defect("systemd does not watch the service", "cli/system_service/unit_file.py",
            '        f"WatchdogSec={WATCHDOG_S}",\n', "", ("cli/system_service/test_unit_on_the_machine.py",)),
     Defect("a signal is told as an exit code", "cli/system_service/unit_status.py",
-           "if why == \"exit-code\" else \"\"", "if why else \"\"", ("cli/system_service/test_service.py",)),
+           "if why == \"exit-code\" else \"\"", "if why else \"\"", ("cli/system_service/test_unit_on_the_machine.py",)),
     Defect("two values of one day make a trend", "fleet/trend.py",
            " or len(set(days)) < len(x)", "", ("fleet/test_drift.py",)),
     Defect("a port that may not be opened is told as a device that is away", "cli/errors.py",
