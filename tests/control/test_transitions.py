@@ -14,7 +14,7 @@ from gateway.control.settings import LeaseAction
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.transitions import ControllerParts, StepOutcome, Transitions
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, Mode, State
 from tests.control.bench import Bench, bsfm, settings
 
 STALE = StopCause(FaultCode.SAMPLE_STALE, "A311 stale")
@@ -222,3 +222,19 @@ def test_behind_an_internal_error_on_the_way_to_0_an_enable_stays() -> None:
     bench.reset()
     bench.enable(20.0)
     assert bench.run(0.5).force_accepted_n == 20.0
+
+
+def test_what_is_held_for_a_lost_master_is_the_least_of_what_was_there_is_applied_and_is_asked_for() -> None:
+    """Once lowered, by whomever, it does not rise again without a beat."""
+    parts = enabled()
+    everything, line = parts.machine.parts, SimpleNamespace(owner_connected=False)
+    everything.commands.command = SimpleNamespace(number=1)
+    everything.commands.lost_sentence = lambda now_s, line: "no heartbeat"
+    held = []
+    for applied_n, asked_n, mode in ((10.0, 12.0, Mode.FORCE), (8.0, 12.0, Mode.FORCE), (8.0, 5.0, Mode.FORCE),
+                                     (8.0, 9.0, Mode.FORCE), (8.0, 1.0, Mode.VOLTAGE)):  # fmt: skip
+        everything.loop.applied_n = applied_n
+        everything.commands.demand = SimpleNamespace(force_n=asked_n, mode=mode)
+        parts.machine.miss_master(2.0, line, LeaseAction.HOLD)  # type: ignore[arg-type]
+        held.append(parts.machine.held_n)
+    assert held == [10.0, 8.0, 5.0, 5.0, 5.0]

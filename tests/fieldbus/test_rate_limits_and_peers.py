@@ -168,3 +168,14 @@ def test_what_waits_in_a_socket_is_counted_and_of_one_that_is_closed_nobody_know
     theirs.close()
     assert count_waiting(Transport()) == inf
     assert count_waiting(asyncio.BaseTransport({})) == inf, "one without a socket"
+
+
+@pytest.mark.parametrize("lines", [10, 11, 12])
+def test_each_line_that_was_left_out_is_told_of_one_alone_too(lines: int) -> None:
+    passed = list[str]()
+    limiter = LogLimiter(lambda cause, sentence: passed.append(sentence))
+    for _ in range(lines):
+        limiter("refused", "no", 5.0)
+    limiter("refused", "again", 6.0)
+    left_out = f" ({lines - 10} more lines like this were left out)" if lines > 10 else ""
+    assert passed[10:] == [f"again{left_out}"]

@@ -46,4 +46,11 @@ DEFECTS = (
     Defect("who types an upload in is told the halves of a float the wrong way round", "cli/master/upload_frames.py",
            "(\" high word\", \" low word\")[place]", "(\" low word\", \" high word\")[place]",
            ("cli/master/test_upload_listing.py",)),
+    Defect("a hold resets a fault behind its own reset", "cli/force_hold/sequence.py",
+           "self._phase.value <= _Phase.RESETTING.value)", "self._phase.value <= _Phase.ENABLING.value)",
+           ("cli/force_hold/test_sequence.py",)),
+    Defect("a hold resets without a beat before", "cli/force_hold/sequence.py",
+           "            return self._write(0)\n        if self._phase is _Phase.RESETTING",
+           "            return self._write(_RESET)\n        if self._phase is _Phase.RESETTING",
+           ("cli/force_hold/test_sequence.py",)),
 )  # fmt: skip

@@ -128,4 +128,9 @@ DEFECTS = (
            ("fieldbus/test_rate_limits_and_peers.py",)),
     Defect("a read of the identification waits for a silence behind noise", "modbus/rtu.py",
            "(adu[1] == P.ENCAPSULATED and adu[2] != MEI_TYPE)", "adu[1] == P.ENCAPSULATED", ("modbus/test_rtu_noise.py",)),
+    Defect("a day of an expiry is told as its month", "modbus/expiry.py",
+           "{moment[4:6]}-{moment[6:8]}", "{moment[6:8]}-{moment[4:6]}", ("modbus/test_expiry.py",)),
+    Defect("one log line that was left out is not told of", "fieldbus/rate_limits.py",
+           "if (missing := lines - _LINES_PER_S) > 0:", "if (missing := lines - _LINES_PER_S) > 1:",
+           ("fieldbus/test_rate_limits_and_peers.py",)),
 )  # fmt: skip

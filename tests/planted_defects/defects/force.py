@@ -119,4 +119,9 @@ DEFECTS = (
     Defect("what quick calls leave of a ramp is lost", "control/limits.py",
            "most_s = TICK_S if dt_s <= TICK_S else min(dt_s, self._longest_step_s)",
            "most_s = min(dt_s, self._longest_step_s)", ("control/test_limits.py",)),
+    Defect("slip stops take a branch beyond itself", "bsfm/slip/slip_stops.py",
+           "return max(-1.0, min(1.0, total))", "return total", ("bsfm/slip/test_slip_stops.py",)),
+    Defect("slip stops leave the voltage all but open", "bsfm/slip/slip_stops.py",
+           "if self.stiffness_per_v * widest_v > STIFFEST:", "if self.stiffness_per_v * widest_v > 1.0:",
+           ("bsfm/slip/test_slip_stops.py",)),
 )  # fmt: skip

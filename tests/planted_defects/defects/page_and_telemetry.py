@@ -76,4 +76,6 @@ DEFECTS = (
     Defect("a broker's refusal counts with its short connections", "telemetry/mqtt/broker_connection.py",
            "self._is_away, self._refused, self._short = True, reason, 0", "self._is_away, self._refused = True, reason",
            ("telemetry/mqtt/test_lost_broker.py",)),
+    Defect("seconds are taken for milliseconds of a client's interval", "telemetry/opcua_connections.py",
+           "max(1000.0 * least_s, params", "max(least_s, params", ("telemetry/test_opcua_connections.py",)),
 )  # fmt: skip

@@ -130,4 +130,10 @@ DEFECTS = (
     Defect("a gateway that ends is enabled once more", "control/readiness.py",
            "        if self._machine.is_stopping:\n            return RefusalReason.NOT_READY\n", "",
            ("control/test_controller.py",)),
+    Defect("a force that was asked lower is held for a lost master as it was", "control/transitions.py",
+           "min(self.held_n, self.parts.loop.applied_n, lowered_n)", "min(self.held_n, self.parts.loop.applied_n)",
+           ("control/test_transitions.py",)),
+    Defect("a force that went down is held for a lost master as it was", "control/transitions.py",
+           "min(self.held_n, self.parts.loop.applied_n, lowered_n)", "min(self.held_n, lowered_n)",
+           ("control/test_transitions.py",)),
 )  # fmt: skip
