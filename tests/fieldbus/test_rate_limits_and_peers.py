@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.defaults import PILE_S
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers, address_of, is_loopback
 from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
@@ -179,3 +180,12 @@ def test_each_line_that_was_left_out_is_told_of_one_alone_too(lines: int) -> Non
     limiter("refused", "again", 6.0)
     left_out = f" ({lines - 10} more lines like this were left out)" if lines > 10 else ""
     assert passed[10:] == [f"again{left_out}"]
+
+
+def test_what_waits_is_late_by_the_pace_at_which_it_is_taken() -> None:
+    """Ten bytes that wait are soon answered where many are taken in four seconds, and late where few are."""
+    for taken, is_late in ((round(40.0 / PILE_S) - 5, True), (round(40.0 / PILE_S) + 5, False)):
+        backlog = Backlog()
+        backlog.note(0.0, 0, 10)
+        backlog.note(4.0, taken, 10)
+        assert backlog.is_late is is_late

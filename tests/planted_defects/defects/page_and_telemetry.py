@@ -78,4 +78,9 @@ DEFECTS = (
            ("telemetry/mqtt/test_lost_broker.py",)),
     Defect("seconds are taken for milliseconds of a client's interval", "telemetry/opcua_connections.py",
            "max(1000.0 * least_s, params", "max(least_s, params", ("telemetry/test_opcua_connections.py",)),
+    Defect("a value that opens something is shown on the page", "web/tabs/rig_values.py",
+           "SECRET: Final = (\"token\", \"password\", \"key\")", "SECRET: Final = (\"token\", \"password\")",
+           ("web/tabs/test_rig_tabs.py",)),
+    Defect("the page names :: as a host", "web/register_table.py",
+           "network.bind in (\"0.0.0.0\", \"::\")", "network.bind == \"0.0.0.0\"", ("web/tabs/test_rig_tabs.py",)),
 )  # fmt: skip

@@ -162,4 +162,7 @@ DEFECTS = (
     Defect("the question of a pressure takes no time on the wire", "profiles/rigs/checks/wire_times.py",
            "took_s.get(\"read_pressure\", took_s.get(\"read_voltage\", 0.0))", "took_s.get(\"read_voltage\", 0.0)",
            ("profiles/rigs/test_wire_checks.py",)),
+    Defect("a thousand strangers have a robot's setpoints forgotten", "audit/write_audit.py",
+           "if len(self._series) >= MOST_SERIES:\n            self.close()",
+           "if len(self._series) >= MOST_SERIES:\n            self._series.clear()", ("audit/test_write_audit.py",)),
 )  # fmt: skip
