@@ -83,4 +83,7 @@ DEFECTS = (
     Defect("a clock's offset does not go with its skew", "twin/load_cell.py",
            "(time_s - cell.clock_offset_s) * (1.0 - cell.clock_skew)",
            "time_s * (1.0 - cell.clock_skew) - cell.clock_offset_s", ("twin/effects/test_effects.py",)),
+    Defect("a port that says nothing is read as one that is gone", "ports/opening.py",
+           "attributes[6][_MINIMUM], attributes[6][_TIME] = 1, 0", "attributes[6][_MINIMUM], attributes[6][_TIME] = 0, 0",
+           ("ports/test_settings_of_others.py",)),
 )  # fmt: skip
