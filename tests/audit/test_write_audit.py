@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from gateway.audit.write_audit import WriteAudit
+from gateway.audit.write_audit import MOST_SERIES, WriteAudit
 from gateway.modbus import ModbusError, Peer, Role, answer
 from gateway.modbus.pdu import is_exception
 from gateway.modbus.server import refuse_unit
@@ -233,3 +233,14 @@ def test_many_peers_do_not_fill_the_memory(watched: Watched) -> None:
         watched.write(Peer(f"fe80::{k:x}", 1, role=Role.MONITOR), 1, 100)
     assert len(watched.kept) == 3000
     assert len(watched.audit._series) <= 1000
+
+
+def test_what_was_only_counted_is_told_when_too_many_kinds_of_writes_come(watched: Watched) -> None:
+    """Of a thousand strangers none may have a robot's setpoints forgotten."""
+    robot = Peer("10.0.0.1", 4000)
+    for setpoint in (1200, 1300, 1400, 1500):
+        watched.write(robot, 1, setpoint)
+    for k in range(MOST_SERIES):
+        watched.write(Peer(f"10.1.{k // 250}.{k % 250}", 4000), 1, 900)
+    (counted,) = [one for one in watched.kept if one.get("count")]
+    assert (counted["what"], counted["count"], counted["old"], counted["new"]) == ("force_setpoint", 3, 12.0, 15.0)

@@ -8,6 +8,7 @@ import pytest
 
 from gateway.cli.errors import no_state_directory, no_such_recording, translate_error
 from gateway.extras import MissingExtraError
+from gateway.ports import PortError
 from gateway.profiles import ProfileError
 from gateway.recording import RecordingError
 
@@ -18,12 +19,14 @@ from gateway.recording import RecordingError
         (ProfileError(()), 78, ""),
         (RecordingError("a.csv: no column"), 65, "E403"),
         (MissingExtraError("E160 numba is not installed"), 69, "E160"),
+        (PortError("E101", "/dev/ttyS0: not allowed"), 77, "E101"),
+        (PortError("E103", "/dev/ttyS0: held by another"), 69, "E103"),
         (OSError(errno.EACCES, os.strerror(errno.EACCES), "/etc/x"), 77, "E105"),
         (OSError(errno.EPERM, os.strerror(errno.EPERM), "/etc/x"), 77, "E105"),
         (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/var/x"), 1, "E106"),
         (ZeroDivisionError("division"), 1, "E500"),
     ],
-    ids=["configuration", "data", "extra", "EACCES", "EPERM", "full disk", "internal"],
+    ids=["configuration", "data", "extra", "port permission", "port held", "EACCES", "EPERM", "full disk", "internal"],
 )
 def test_an_error_that_no_verb_has_caught_ends_with_its_code(error: Exception, exit_code: int, code: str) -> None:
     told = translate_error(error, "run demo", debug=False)

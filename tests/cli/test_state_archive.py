@@ -136,15 +136,33 @@ def test_what_was_there_is_there_again_where_the_disk_refuses_the_last_step(
     assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "state"]  # noqa: PTH208
 
 
-def test_its_owner_may_read_what_is_restored_whatever_the_archive_says(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("said", "restored"), [(0, 0o600), (0o640, 0o640), (0o666, 0o644), (0o6777, 0o744)])
+def test_its_owner_may_read_what_is_restored_and_nobody_else_write_it_whatever_the_archive_says(
+    tmp_path: Path, said: int, restored: int
+) -> None:
     source = tmp_path / "b.tar.gz"
     with tarfile.open(source, "w:gz") as archive:
-        for name, data, mode in (("backup.json", b'{"format": 1}', 0o600), ("state/shut", b"x", 0)):
+        for name, data, mode in (("backup.json", b'{"format": 1}', 0o600), ("state/shut", b"x", said)):
             info = tarfile.TarInfo(name)
             info.size, info.mode = len(data), mode
             archive.addfile(info, io.BytesIO(data))
     unpack_state(source, tmp_path / "new")
-    assert (tmp_path / "new" / "shut").stat().st_mode & 0o777 == 0o600
+    assert (tmp_path / "new" / "shut").stat().st_mode & 0o7777 == restored
+    assert (tmp_path / "new").stat().st_mode & 0o777 == 0o700
+
+
+def test_damage_that_only_the_checksum_at_the_end_shows_is_found_before_anything_is_replaced(
+    state: Path, tmp_path: Path
+) -> None:
+    pack_state(state, source := tmp_path / "b.tar.gz")
+    data = bytearray(source.read_bytes())
+    data[-8] ^= 1
+    source.write_bytes(data)
+    (state / "mine.txt").write_text("mine")
+    with pytest.raises(ArchiveError, match="damaged"):
+        unpack_state(source, state)
+    assert (state / "mine.txt").read_text() == "mine"
+    assert sorted(os.listdir(tmp_path)) == ["b.tar.gz", "state"]  # noqa: PTH208
 
 
 @pytest.mark.parametrize("name", ["state/.", "state/..", "state/lock", "state/control.sock"])

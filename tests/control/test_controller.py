@@ -29,6 +29,18 @@ def test_from_the_moment_of_a_stop_on_nothing_else_is_taken() -> None:
     assert bench.refused and bench.refused.reason is RefusalReason.STOPPING
 
 
+def test_behind_a_stop_nothing_is_enabled_any_more() -> None:
+    """While the valve of a rig goes to where it rests, or a guardian has not ended it yet."""
+    bench = Bench()
+    bench.run(0.5)
+    bench.controller.stop()
+    bench.step()
+    assert bench.last.enable_block is RefusalReason.NOT_READY
+    bench.enable(10.0)
+    assert bench.refused and bench.refused.reason is RefusalReason.NOT_READY
+    assert bench.last.state is State.OFF
+
+
 def test_each_calibration_that_is_used_brings_the_noise_that_it_has_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     told: list[float] = []
     bench = Bench()

@@ -112,6 +112,16 @@ def test_a_ramp_lasts_as_long_as_it_says_at_any_pace_of_loop_and_cell(gap_s):
     assert at_n == pytest.approx(10.0 * steps * gap_s, abs=10.0 * TICK_S)
 
 
+def test_what_calls_in_quick_succession_leave_is_kept_up_to_a_tick():
+    """Of a loop that is asked between two readings: a movement that waits for the second one may claim both."""
+    budget = RateBudget()
+    budget.spend(1.0, 1.0 / TICK_S)
+    assert budget.available_s == 0.0
+    for calls in range(1, 16):
+        budget.earn(0.1 * TICK_S)
+        assert budget.available_s == pytest.approx(min(0.1 * calls, 1.0) * TICK_S)
+
+
 def test_of_two_limits_that_act_the_slew_is_told_until_the_range_alone_is_left():
     """On the way to a voltage that is out of range it is the pace that keeps it: `limited_by` says the strongest."""
     stage, told = VoltageLimiter(LIMITS), []

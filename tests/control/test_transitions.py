@@ -14,7 +14,7 @@ from gateway.control.settings import LeaseAction
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.transitions import ControllerParts, StepOutcome, Transitions
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, State
+from gateway.registers.words import ControlBit, Mode, State
 from tests.control.bench import Bench, bsfm, settings
 
 STALE = StopCause(FaultCode.SAMPLE_STALE, "A311 stale")
@@ -32,7 +32,7 @@ class Parts:
         )  # fmt: skip
         commands = SimpleNamespace(
             who="10.0.0.1", start_lease=lambda now_s: note("lease"), expect_clearing=lambda: note("clearing"),
-            has_moved=has_moved,
+            has_moved=has_moved, let_no_beat_count=lambda: note("no beat counts"),
         )  # fmt: skip
         parts: Any = ControllerParts(
             commands,  # type: ignore[arg-type]
@@ -72,6 +72,22 @@ def test_the_first_fault_stays_whatever_breaks_behind_it() -> None:
     parts = enabled()
     parts.machine.fail_internally(3.0)
     assert (parts.machine.state, parts.machine.fault, parts.machine.faulted_s) == (State.FAULT, FaultCode.INTERNAL, 3.0)
+
+
+def test_a_reset_of_a_fault_acknowledges_a_restart() -> None:
+    parts = Parts()
+    parts.machine.fail(2.0, STALE)
+    assert parts.machine.is_restarted, "by itself it does not"
+    parts.machine.reset()
+    assert (parts.machine.state, parts.machine.fault) == (State.OFF, FaultCode.NONE)
+    assert not parts.machine.is_restarted
+
+
+def test_at_the_end_of_a_way_to_0_no_beat_of_before_counts_any_more() -> None:
+    """What was written on that way with enable at 1 would be a rise behind it."""
+    parts = enabled()
+    parts.machine.end_ramp()
+    assert parts.did == ["no beat counts", "loop.rest", "run.rest", "clearing"]
 
 
 def test_a_reset_in_off_is_the_device_s_alone_and_acknowledges_no_restart() -> None:
@@ -206,3 +222,19 @@ def test_behind_an_internal_error_on_the_way_to_0_an_enable_stays() -> None:
     bench.reset()
     bench.enable(20.0)
     assert bench.run(0.5).force_accepted_n == 20.0
+
+
+def test_what_is_held_for_a_lost_master_is_the_least_of_what_was_there_is_applied_and_is_asked_for() -> None:
+    """Once lowered, by whomever, it does not rise again without a beat."""
+    parts = enabled()
+    everything, line = parts.machine.parts, SimpleNamespace(owner_connected=False)
+    everything.commands.command = SimpleNamespace(number=1)
+    everything.commands.lost_sentence = lambda now_s, line: "no heartbeat"
+    held = []
+    for applied_n, asked_n, mode in ((10.0, 12.0, Mode.FORCE), (8.0, 12.0, Mode.FORCE), (8.0, 5.0, Mode.FORCE),
+                                     (8.0, 9.0, Mode.FORCE), (8.0, 1.0, Mode.VOLTAGE)):  # fmt: skip
+        everything.loop.applied_n = applied_n
+        everything.commands.demand = SimpleNamespace(force_n=asked_n, mode=mode)
+        parts.machine.miss_master(2.0, line, LeaseAction.HOLD)  # type: ignore[arg-type]
+        held.append(parts.machine.held_n)
+    assert held == [10.0, 8.0, 5.0, 5.0, 5.0]

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gateway.defaults import PILE_S
 from gateway.fieldbus import ServerSettings
 from gateway.fieldbus.peers import Peers, address_of, is_loopback
 from gateway.fieldbus.rate_limits import Backlog, LogLimiter, RequestRate
@@ -168,3 +169,23 @@ def test_what_waits_in_a_socket_is_counted_and_of_one_that_is_closed_nobody_know
     theirs.close()
     assert count_waiting(Transport()) == inf
     assert count_waiting(asyncio.BaseTransport({})) == inf, "one without a socket"
+
+
+@pytest.mark.parametrize("lines", [10, 11, 12])
+def test_each_line_that_was_left_out_is_told_of_one_alone_too(lines: int) -> None:
+    passed = list[str]()
+    limiter = LogLimiter(lambda cause, sentence: passed.append(sentence))
+    for _ in range(lines):
+        limiter("refused", "no", 5.0)
+    limiter("refused", "again", 6.0)
+    left_out = f" ({lines - 10} more lines like this were left out)" if lines > 10 else ""
+    assert passed[10:] == [f"again{left_out}"]
+
+
+def test_what_waits_is_late_by_the_pace_at_which_it_is_taken() -> None:
+    """Ten bytes that wait are soon answered where many are taken in four seconds, and late where few are."""
+    for taken, is_late in ((round(40.0 / PILE_S) - 5, True), (round(40.0 / PILE_S) + 5, False)):
+        backlog = Backlog()
+        backlog.note(0.0, 0, 10)
+        backlog.note(4.0, taken, 10)
+        assert backlog.is_late is is_late

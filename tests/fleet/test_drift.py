@@ -160,3 +160,10 @@ def test_of_more_cells_than_are_shown_the_rest_is_counted(capsys: pytest.Capture
     assert headline(cells).startswith("23 of 23 cells drift: cell 00 (") and headline(cells).endswith("; and 20 more")
     print_cells(cells)
     assert capsys.readouterr().out.endswith("and 3 cells more: cells.parquet has all\n")
+
+
+def test_two_values_of_one_day_and_three_days_make_no_trend() -> None:
+    """Between two values of one moment no slope is any number."""
+    assert fit_trend([0.0, 1.0, 1.0, 2.0, 3.0], [0.0, 1.0, 5.0, 2.0, 3.0]) is None
+    assert fit_trend([0.0, 1.0, 2.0], [0.0, 1.0, 2.0]) is None
+    assert fit_trend([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, 3.5]) is not None

@@ -3,7 +3,7 @@
 import pytest
 
 from gateway.modbus.certificate import PeerCertificate
-from gateway.modbus.expiry import end_of
+from gateway.modbus.expiry import day_of, end_of
 
 
 def shown(name: str, ends: str, signed_by: str = "", number: str = "01") -> PeerCertificate:
@@ -52,3 +52,7 @@ def test_a_ca_that_another_of_its_file_has_signed_ends_with_the_chain(ca: list[P
 def test_the_gateway_s_own_ends_with_those_between_it_and_the_root(own: list[PeerCertificate], ends: str) -> None:
     """A root's copy does not count, every client has its own; of one between, which only we send, nothing was told."""
     assert end_of("certificate", own) == ends
+
+
+def test_a_day_is_told_as_people_write_it() -> None:
+    assert day_of("20261203040506Z") == "2026-12-03"

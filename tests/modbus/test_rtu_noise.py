@@ -6,6 +6,7 @@ import pytest
 
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.crc import crc16
+from gateway.modbus.identification import MEI_TYPE
 from gateway.modbus.rtu import encode_adu
 from gateway.modbus.rtu_receiver import MOST_BYTES, SPLIT_S, RtuReceiver, RtuRequest
 from tests.modbus.host_answers import loopback_request
@@ -50,6 +51,20 @@ def test_a_loopback_in_two_pieces_is_one_whatever_stands_at_the_end_of_the_first
     """A byte above 247 begins nothing, so that only the function tells that more is to come."""
     request = encode_adu(1, loopback_request(b"\xff\xff"))
     assert Bus().send(request[:size], request[size:], pause_s=0.016).requests() == answered(request[1:-2])
+
+
+@pytest.mark.parametrize("stray", [b"\x55\x66\x55", b"\x07\x03\xf0", b"\x05\x10\x00\x00\x00\x7b\xf6"])
+def test_a_read_of_the_identification_is_heard_behind_noise_as_soon_as_any_read(stray: bytes) -> None:
+    """Its length is known, unlike that of another use of its function: no silence behind it is waited for."""
+    heard_s = []
+    for pdu in (READ, bytes((P.ENCAPSULATED, MEI_TYPE, 1, 0))):
+        bus = Bus()
+        begin_s = bus.now_s
+        bus.send(stray, encode_adu(1, pdu), pause_s=0.01).pause(1.0)
+        ((at_s, request),) = bus.heard
+        assert request.pdu == pdu
+        heard_s.append(at_s - begin_s)
+    assert heard_s[1] == pytest.approx(heard_s[0], abs=1e-9)
 
 
 def test_an_answer_under_our_own_number_is_no_request() -> None:

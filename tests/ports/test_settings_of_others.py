@@ -160,3 +160,15 @@ def test_a_line_that_was_stopped_before_it_is_opened_sends_from_its_first_byte_o
     heard = os.read(line.fd, 16) if select.select([line.fd], [], [], 5.0)[0] else b""
     os.close(descriptor)
     assert heard == b"SET 0"
+
+
+def test_a_port_that_has_nothing_to_say_is_not_read_as_one_that_is_gone(line: Pty) -> None:
+    """As pyserial leaves it, both were no bytes."""
+    descriptor = open_descriptor(line.path, SerialSettings(baud=9600))
+    try:
+        with pytest.raises(BlockingIOError):
+            os.read(descriptor, 1)
+        os.write(line.fd, b"x")
+        assert select.select([descriptor], [], [], 5.0)[0] and os.read(descriptor, 8) == b"x"
+    finally:
+        os.close(descriptor)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.processes import state_lock
 from gateway.processes.state_lock import NAME, hold_state_lock
 
 
@@ -64,3 +65,21 @@ def test_the_lock_that_an_administrator_leaves_behind_is_the_service_s(tmp_path:
     finally:
         os.umask(before)
     assert (tmp_path / NAME).stat().st_uid == 501
+
+
+def test_a_disk_that_has_become_read_only_has_the_lock_s_file_still(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is no reason not to control; and where there is no file, there is no lock."""
+
+    def refuse(path: Path, flags: int = os.O_RDONLY, mode: int = 0) -> int:
+        if flags & os.O_WRONLY:
+            raise OSError(errno.EROFS, "read-only")
+        return os.open(path, flags)
+
+    monkeypatch.setattr(state_lock, "open_plain", refuse)
+    with pytest.raises(OSError, match="read-only"), hold_state_lock(tmp_path):
+        pass
+    (tmp_path / NAME).touch()
+    with hold_state_lock(tmp_path) as is_ours, hold_state_lock(tmp_path) as is_theirs:
+        assert is_ours and not is_theirs

@@ -198,3 +198,13 @@ def test_silence_is_counted_from_the_last_word_and_a_closed_timer_waits_for_noth
     assert timers.waiting == [] and other is not timer
     timers.pass_to(200.0)
     assert called == [110.0, 116.0]
+
+
+@pytest.mark.parametrize(("wanted_ms", "given_ms"), [(0.001, 200.0), (199.0, 200.0), (1000.0, 1000.0)])
+def test_no_client_is_told_more_often_than_there_is_something_new(wanted_ms: float, given_ms: float) -> None:
+    """An interval is in milliseconds: by one of a microsecond a client took a whole core."""
+    service = SimpleNamespace(create_subscription=AsyncMock(), subscriptions={})
+    create, params = service.create_subscription, SimpleNamespace(RequestedPublishingInterval=wanted_ms)
+    bound_publishing(service, 0.2)
+    asyncio.run(service.create_subscription(params, None, 7))
+    assert create.await_count == 1 and params.RequestedPublishingInterval == given_ms

@@ -7,6 +7,7 @@ import pytest
 
 from gateway.twin import Plant, Regulator, Twin
 from gateway.twin.experiment import Floats
+from gateway.twin.regulator import RegulatorState
 from tests.twin.traces import trace
 
 STEP_PA = 0.9e6 / 1023
@@ -76,6 +77,17 @@ def test_a_fractional_delay_shifts_the_centre_of_a_step_by_just_that() -> None:
         pressure_trace(Regulator(delay_s=delay_s), 10.0, 0.05).sum() * 0.001 / 0.9e6 for delay_s in (0.0, 0.0073)
     ]
     assert area_under[0] - area_under[1] == pytest.approx(0.0073, abs=1.0e-9)
+
+
+def test_a_step_in_which_a_command_arrives_has_the_mean_of_what_was_there() -> None:
+    """Of a regulator without any lag, from one pressure to another: not the sum of both."""
+    step_s = 0.001
+    state = RegulatorState(Regulator(delay_s=1.25 * step_s), step_s)
+    found = []
+    for voltage_v in (4.0, 4.0, 4.0, 8.0, 8.0, 8.0, 8.0):
+        state.command(voltage_v)
+        found.append(state.step() / 0.9e6)
+    assert found == pytest.approx([0.0, 0.3, 0.4, 0.4, 0.7, 0.8, 0.8])
 
 
 def test_a_lag_is_exact_for_a_held_command() -> None:

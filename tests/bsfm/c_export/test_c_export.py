@@ -202,6 +202,13 @@ def test_the_same_calibration_gives_the_same_ascii_text():
         assert all(text.isascii() and text.endswith("\n") and "$" not in text for text in first.values())
 
 
+def test_no_letter_of_a_person_s_text_is_lost_in_a_comment():
+    (header, *_) = (
+        text for name, text in c_source(replace(CASES["demo"], rig="Käfer №7")).items() if name.endswith(".h")
+    )
+    assert r"K\xe4fer \u21167" in header
+
+
 @pytest.mark.parametrize(
     ("name", "prefix"), [("demo-2 (new)", "bsfm_demo_2_new"), ("7", "bsfm_7"), ("✓", "bsfm_calibration_1")]
 )

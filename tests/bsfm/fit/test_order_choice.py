@@ -8,6 +8,7 @@ import pytest
 from gateway.bsfm import RationalBezier
 from gateway.bsfm.fit.levenberg_marquardt import Effort
 from gateway.bsfm.fit.order_choice import FitSettings, Score, choose_fit, score_orders
+from gateway.bsfm.fit.outliers import inlier_mask
 from gateway.bsfm.ladder.measured_ladder import Ladder
 
 QUICK = FitSettings(effort=Effort(screened=64, descending=8))
@@ -59,6 +60,31 @@ def test_a_shaken_group_does_not_make_a_straight_line_as_good_as_the_best(loops)
     assert choose_fit([straight, bent]) is bent
     doubtful = scored(straight, 0.28, 0.80)
     assert choose_fit([doubtful, bent]) is doubtful
+
+
+def test_what_may_drive_a_plant_is_chosen_however_much_better_something_else_is(loops):
+    useful, bent_back = score_orders(loops["smooth"](6), ["bsfm"], (1, 2), "tied", QUICK)
+    unusable = replace(bent_back.result, verdicts=replace(bent_back.result.verdicts, falling_monotone=False))
+    useful, bent_back = scored(useful, 4.0, 4.1), scored(replace(bent_back, result=unusable), 0.01, 0.02)
+    assert choose_fit([useful, bent_back]) is useful
+    assert choose_fit([bent_back]) is bent_back
+
+
+def test_how_sure_a_held_out_error_is_goes_by_the_scatter_of_its_groups(loops):
+    ladder = loops["smooth"](3, noise_n=0.5)
+    (score,) = score_orders(ladder.part(ladder.group < 2), ["bsfm"], (1,), "tied", QUICK)
+    first, second = score.groups_n2
+    assert score.heldout_n2 == pytest.approx(0.5 * (first + second)) and first != second
+    assert score.error_n2 == pytest.approx(0.5 * abs(first - second)), "of two values: half of what parts them"
+
+
+@pytest.mark.parametrize(("readings", "rejected"), [(2, 0), (3, 1)])
+def test_of_two_readings_of_a_stair_nobody_can_tell_which_one_is_wrong(readings: int, rejected: int) -> None:
+    """Of the other stairs, read three times each, the noise is known all the same."""
+    volts = np.concatenate([np.repeat(np.arange(10.0), 3), np.full(readings, 20.0)])
+    force_n = np.concatenate([np.tile([0.0, 0.1, -0.1], 10), [0.0, 8.0, 0.05][:readings]])
+    ladder = Ladder(volts, force_n, np.ones(len(volts), dtype=int), np.zeros(len(volts), dtype=int))
+    assert int((~inlier_mask(ladder)).sum()) == rejected
 
 
 def test_one_group_cannot_be_left_out(loops):

@@ -56,3 +56,16 @@ def test_rows_that_are_lost_at_a_stairs_beginning_leave_the_one_before_as_it_was
     kept = (within == 0) & (stair == 0) | (within >= lost)
     points = find_settled_points(np.arange(200)[kept] / 20.0, 0.5 * stair[kept], force_n[kept])
     assert points.force_n.tolist() == pytest.approx(list(range(0, 20, 2)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("late", [0, 1])
+def test_a_table_of_one_row_to_a_stair_is_read_by_its_turns_whatever_the_sign_of_its_force(
+    sign: float, late: int
+) -> None:
+    """Of a cell whose wires are exchanged the force falls where the voltage rises, as clearly."""
+    volts = np.array([0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0])
+    force_n = sign * np.roll(8.0 * volts, late)
+    points = find_settled_points(1.0 * np.arange(len(volts)), volts, force_n)
+    assert points.force_n.tolist() == pytest.approx((sign * 8.0 * points.voltage_v).tolist())
+    assert len(points) == len(volts) - late

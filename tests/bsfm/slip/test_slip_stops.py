@@ -80,3 +80,21 @@ def test_after_a_reversal_the_stops_give_way_one_by_one():
     assert memory[0] == -1.0 < memory[1] < 1.0
     memory = model.memory_after(memory, 29.0, 1.0)
     assert memory == (-1.0, -1.0)
+
+
+def test_shares_of_decimal_digits_take_no_branch_beyond_itself() -> None:
+    stops = SlipStops((1.0, 2.0), (0.5, 0.5000005))
+    assert stops.branch_share(stops.at(1)) == 1.0 and stops.branch_share(stops.at(-1)) == -1.0
+
+
+@pytest.mark.parametrize(("stiffness", "is_taken"), [(0.94, True), (0.96, False)])
+def test_stops_that_leave_the_voltage_open_right_after_a_reversal_are_refused(stiffness: float, is_taken: bool) -> None:
+    """At 1 it is any voltage; from 0.95 on it moves more than twenty times as far as on a branch."""
+    rising, falling = (RationalBezier(0.0, 10.0, [0.0, middle_n, 40.0], [1.0, 1.0, 1.0]) for middle_n in (15.0, 25.0))
+    branches = Branches(rising, falling)
+    stops = SlipStops((half_width_bound_v(branches) / stiffness,), (1.0,))
+    if is_taken:
+        stops.check(branches)
+    else:
+        with pytest.raises(ValueError, match="is needed"):
+            stops.check(branches)

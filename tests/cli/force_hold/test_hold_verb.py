@@ -145,3 +145,10 @@ def test_no_time_is_no_press_of_a_moment(time: str, call: Any) -> None:
     """Nothing is asked of anybody: there is no gateway."""
     done = call("hold", "12", "--for", time, "--gateway", "127.0.0.1:1")
     assert done.exit_code == 2 and f"{time} is no time such as 10s" in done.output
+
+
+def test_a_warning_that_comes_is_a_line_at_once_where_there_is_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    line = StateLine(as_json=False)
+    for at_s, warnings in ((0.0, 0), (0.1, 0), (0.2, 1 << 2), (0.3, 1 << 2)):
+        line.show(replace(PRESSING, warnings=WarningBit(warnings)), at_s)
+    assert [one.split()[0] for one in capsys.readouterr().out.splitlines()] == ["0.0", "0.2"]

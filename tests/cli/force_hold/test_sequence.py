@@ -255,3 +255,11 @@ def test_a_refusal_ends_it_with_its_reason(bank: PlainBank, serve: Serve, beatin
     beat.join(5.0)
     assert beat.failure is not None and beat.failure.exit_code == 1
     assert beat.failure.format_message().startswith("W204 value out of range: exception 03")
+
+
+def test_a_fault_is_reset_once_behind_a_beat_of_its_own_and_one_that_comes_behind_the_reset_ends_it() -> None:
+    run, fault = HoldRun(10.0, heartbeat=5, resets=True), StatusReading(State.FAULT)
+    first, second = (run.next(fault, now_s, stops=False) for now_s in (0.0, 0.1))
+    assert first == HoldWrite(6, 0), "a beat alone: the gateway has zeroed the heartbeat with the fault"
+    assert second is not None and (second.heartbeat, second.setpoint_n) == (7, 0.0) and second.control_word
+    assert run.next(fault, 0.2, stops=False) is None and run.end is HoldEnd.FAULT

@@ -108,6 +108,22 @@ def test_behind_a_silence_the_connection_is_a_new_one(register_map: RegisterMap)
         fresh.read_words(0, 1)
 
 
+def test_behind_a_question_that_somebody_has_broken_off_the_connection_is_a_new_one(register_map: RegisterMap) -> None:
+    """Its answer is still to come: on the same connection it would be taken for that of the stop behind it."""
+    closed = list[bool]()
+
+    def break_off(address: int, **options: int) -> Any:
+        raise KeyboardInterrupt
+
+    StubWire.client = SimpleNamespace(  # type: ignore[attr-defined]
+        connected=True, read_holding_registers=break_off, close=lambda: closed.append(True)
+    )
+    client = GatewayClient(StubWire("127.0.0.1", 5020), 1, register_map)
+    with pytest.raises(KeyboardInterrupt):
+        client.read_words(0, 1)
+    assert closed == [True]
+
+
 def test_a_request_carries_no_more_words_than_modbus_allows(register_map: RegisterMap) -> None:
     client = GatewayClient(TcpWire("127.0.0.1", 5020), 1, register_map)
     arrays = [one for one in register_map.registers_of("staging") if "_b_" in one.name or "_w_" in one.name]

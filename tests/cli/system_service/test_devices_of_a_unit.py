@@ -34,6 +34,14 @@ def test_the_port_of_each_line_is_let_in(more: str) -> None:
     assert allowed(rig) == ["char-ttyS rw"] + ["char-ttyAMA rw"] * (more != "none")
 
 
+def test_a_simulated_rig_is_let_at_no_device_whatever_its_lines_say() -> None:
+    """Its ports may be those of a machine beside it, which another gateway controls."""
+    rig = load_rig("irc5-cell", simulated=False)
+    rig = replace(rig, output=replace(rig.output, port="/dev/ttyS0"), simulated=True)
+    assert allowed(rig) == []
+    assert allowed(replace(rig, simulated=False)) != []
+
+
 def test_no_program_probes_an_adapter_and_none_keeps_what_it_has_read() -> None:
     """A modem manager has sent `AT` to a pressure regulator; 16 ms of an FTDI chip are dead time of the loop."""
     rules = [line for line in udev_text().splitlines() if not line.startswith("#")]

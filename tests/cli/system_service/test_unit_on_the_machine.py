@@ -17,6 +17,7 @@ from gateway.cli.main import command
 from gateway.cli.system_service import installation
 from gateway.cli.system_service.installation import install_service, plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
+from gateway.cli.system_service.unit_status import parse_status
 from gateway.processes import exit_codes
 from gateway.processes.scheduling import priority
 from gateway.profiles import load_rig
@@ -204,3 +205,13 @@ def test_the_command_that_root_is_told_to_give_is_one_that_can_be_run(
     with pytest.raises(CliError) as caught:
         installation.install_service(plan, tmp_path)
     assert f"; sudo {tmp_path}/force-gateway service install irc5-cell, or " in caught.value.message
+
+
+@pytest.mark.parametrize(
+    ("result", "status", "told"),
+    [("exit-code", "78", "exit-code, exit code 78"), ("signal", "9", "signal"), ("oom-kill", "9", "oom-kill")],
+)
+def test_only_an_exit_code_is_told_as_one(result: str, status: str, told: str) -> None:
+    """Of a signal systemd has its number there."""
+    shown = f"LoadState=loaded\nActiveState=failed\nNRestarts=0\nResult={result}\nExecMainStatus={status}\n"
+    assert parse_status("a.service", shown).sentence.startswith(f"a.service: failed ({told}); ")

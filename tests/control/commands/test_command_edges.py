@@ -64,6 +64,18 @@ def test_what_a_master_writes_ahead_of_the_bank_s_clearing_is_its_own_beat() -> 
     assert commands.lease_age_s(2.5) == 0.5
 
 
+@pytest.mark.parametrize("manner", ["repeats", "has_waited"])
+def test_a_heartbeat_that_comes_again_or_has_waited_renews_no_lease_and_the_next_one_does(manner: str) -> None:
+    commands = tracker()
+    commands.take(2.0, Command(heartbeat=5, number=2))
+    commands.take(2.4, Command(heartbeat=6, number=3)._replace(**{manner: True}))
+    assert commands.lease_age_s(2.5) == 0.5
+    commands.take(2.6, Command(heartbeat=6, number=4))
+    assert commands.lease_age_s(2.7) == pytest.approx(0.7), "it is known"
+    commands.take(2.8, Command(heartbeat=7, number=5))
+    assert commands.lease_age_s(2.9) == pytest.approx(0.1)
+
+
 def test_limits_of_a_calibration_end_with_it() -> None:
     """A smaller one before leaves no trace."""
     commands = CommandTracker(settings())

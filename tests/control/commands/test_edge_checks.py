@@ -15,7 +15,7 @@ from gateway.control.sample_conditioning import Reading, SampleConditioner
 from gateway.control.self_test.items import SelfTestPlan
 from gateway.devices.messages import ForceSample, Quality
 from gateway.registers.command import Command
-from gateway.registers.words import CalibrationPhase, ControlBit, State
+from gateway.registers.words import CalibrationPhase, ControlBit, Mode, State
 from gateway.registers.writes.proposed_write import EdgeRefusal, ProposedWrite
 from tests.control.bench import bsfm, settings
 
@@ -26,6 +26,14 @@ REST = Situation(
     is_lowest=True, applied_n=0.0, leaving_n=0.0, repeats="", held_n=None, ramps_down=False,
     stall_words="",
 )  # fmt: skip
+
+
+def checked_behind(before: Command) -> EdgeCheck:
+    """A command that stands, whose master beat last with it."""
+    rig = replace(settings(), supervision=replace(settings().supervision, lease_s=0.3))
+    tracker = CommandTracker(rig)
+    tracker.take(0.5, before)
+    return EdgeCheck(tracker, SampleConditioner(rig.supervision), ActiveRun(rig, bsfm()))
 
 
 def check(rest_n: float = 0.0, phase: CalibrationPhase = CalibrationPhase.IDLE) -> EdgeCheck:
@@ -190,3 +198,35 @@ def test_an_edge_that_cannot_be_taken_now_is_refused_and_taken_otherwise(
 def test_a_reset_in_the_same_write_lets_a_tare_follow_it() -> None:
     """Each edge is judged in the state that the one before it leaves."""
     assert refusal(replace(REST, state=State.FAULT), ControlBit.RESET_FAULT | TARE) is None
+
+
+HELD = replace(REST, state=State.HOLDING, applied_n=10.0, held_n=10.0, lost_s=0.9)
+
+
+@pytest.mark.parametrize(
+    ("before", "asked", "is_taken"),
+    [
+        ({"force_setpoint_n": 8.0}, {"force_setpoint_n": 10.0}, True),
+        ({"force_setpoint_n": 8.0}, {"force_setpoint_n": 10.1}, False),
+        ({"force_setpoint_n": 10.1}, {"force_setpoint_n": 10.1}, True),  # what stands is lowered by control
+        ({"voltage_setpoint_v": 2.0, "mode": Mode.VOLTAGE}, {"voltage_setpoint_v": 2.0, "mode": Mode.VOLTAGE}, True),
+        ({"voltage_setpoint_v": 2.0, "mode": Mode.VOLTAGE}, {"voltage_setpoint_v": 2.1, "mode": Mode.VOLTAGE}, False),
+        ({"voltage_setpoint_v": 2.0}, {"voltage_setpoint_v": 2.0, "mode": Mode.VOLTAGE}, False),  # it begins to act now
+        ({"voltage_setpoint_v": 2.0}, {"voltage_setpoint_v": 2.5}, True),  # in force mode it does nothing
+    ],
+)
+def test_what_is_held_for_a_lost_master_rises_with_a_beat_alone(before: dict, asked: dict, is_taken: bool) -> None:
+    """Not by a tenth of a newton, nor by a voltage that stood without a meaning."""
+    checked = checked_behind(Command(control_word=ENABLE, number=1, heartbeat=5, **before))
+    command = Command(control_word=ENABLE, number=2, heartbeat=5, **asked)
+    refused = checked.refusal(ProposedWrite(command, lambda: ("force_setpoint",)), HELD)
+    assert (refused is None) is is_taken
+    assert refused is None or (refused.reason, refused.bit) == (RefusalReason.HEARTBEAT_STALE, ControlBit(0))
+
+
+@pytest.mark.parametrize(("state", "is_taken"), [(State.OFF, True), (State.RAMPING, False)])
+def test_what_is_written_on_the_way_to_nothing_is_refused_and_nothing_that_waits_at_rest(state: State, is_taken: bool):
+    """A gateway that ends says so only where a force still goes down."""
+    at = replace(REST, state=state, ramps_down=True)
+    asked = ProposedWrite(Command(number=1, force_setpoint_n=3.0), lambda: ("force_setpoint",))
+    assert (check().refusal(asked, at) is None) is is_taken

@@ -18,6 +18,8 @@ BOWED = CommandMap(bow=0.05, s=0.02)
 def test_a_rig_that_is_quicker_than_it_was_said_gets_no_harder_trim() -> None:
     quicker = TimingCompensation(delay_s=0.01, lags_s=0.02, more_s=-0.08)
     assert quicker.settings(settings()).trim == settings().trim
+    nothing_left = TimingCompensation(delay_s=0.0, lags_s=0.0, more_s=-0.5)
+    assert 0.0 < nothing_left.settings(settings()).supervision.response_lag_s <= 0.01
     slower = TimingCompensation(delay_s=0.1, lags_s=0.2, more_s=0.12)
     assert slower.settings(settings()).trim.gain_v_per_n_s == pytest.approx(0.5 * settings().trim.gain_v_per_n_s)
 

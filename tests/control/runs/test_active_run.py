@@ -89,3 +89,12 @@ def test_a_run_of_this_machine_takes_the_force_at_rest_as_zero_where_it_is_asked
         assert bench.controller.active_run.running and bench.controller.zero_n == pytest.approx(zero_n, abs=0.15)
         assert any(event.startswith("tare") for event in bench.events) is is_asked
         assert bench.last.enable_block is RefusalReason.CALIBRATING
+
+
+@pytest.mark.parametrize(("payload_n", "told_n"), [(8.0, 48.0), (-8.0, 40.0), (30.0, 60.0)])
+def test_who_is_asked_before_a_run_is_told_of_the_payload_s_weight_too(payload_n: float, told_n: float) -> None:
+    """What hangs below the tool presses beside the slide; what it takes away may be put down meanwhile."""
+    model = bsfm()
+    top_v, _ = model.voltage_v(40.0, 1.0)
+    active = ActiveRun(CONTROL, model, lambda: payload_n)
+    assert active.most_contact_n(top_v) == pytest.approx(told_n, abs=0.01)

@@ -59,6 +59,12 @@ def test_a_plant_that_rang_in_fewer_than_half_of_its_stairs_does_not_ring():
     assert approach.ramp_s == 0.0
 
 
+def test_no_way_to_a_stair_takes_longer_than_two_seconds() -> None:
+    """Of a plant so slow that its peak comes after a second the whole ladder would be ways."""
+    assert observed(0.3, 0.1, noise_n=0.03).ramp_s < 2.0
+    assert observed(0.3, 0.35, noise_n=0.03).ramp_s == 2.0
+
+
 @pytest.mark.parametrize("damping", [0.9, 1.0, 2.0])
 def test_a_plant_that_does_not_ring_is_stepped_at_once(damping):
     assert observed(damping, 0.05, noise_n=0.1).ramp_s == 0.0

@@ -79,6 +79,19 @@ def test_a_healthy_machine_passes_each_item_and_each_says_what_was_seen() -> Non
     assert played.run.end_sentence == f"self-test done after {played.course[-1][0]:.1f} s"
 
 
+def test_readings_count_from_when_they_were_taken_not_from_the_tick_that_saw_them() -> None:
+    """Of 70 a second some wait for two ticks of 10 ms, and none comes late."""
+    run, last = SelfTestRun(SelfTestPlan(), known()), -1
+    for k in range(200):
+        at_s, newest = TICK_S * k, int(70.0 * TICK_S * k + 1e-9)
+        run.observe_line(LineStatus(cell_counts=WireCounts(0, newest + 1, 0)))
+        age_s = at_s - newest / 70.0
+        run.step(at_s, Reading(0.02 * (-1) ** newest, 0.0, age_s, 1.0 / 70.0, newest != last, True, True))
+        last = newest
+    (said,) = [one.text for one in run.report(1, FaultCode.NONE).findings if one.item is Item.CELL_LINE]
+    assert "70 readings per second, 0 missing, 0 unreadable, longest gap 14 ms" in said
+
+
 def test_a_rig_whose_self_test_moves_nothing_ends_behind_the_rest() -> None:
     still = Known(replace(settings(), self_test=SelfTestSettings(force_n=0.0)), bsfm())
     played = Played(of=still).to_the_end()

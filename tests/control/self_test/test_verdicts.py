@@ -30,7 +30,7 @@ from gateway.control.self_test.judgement import (
 )
 from gateway.control.self_test.line_watch import LineWatch
 from gateway.control.self_test.measurements import Slope, intervals_of
-from gateway.control.self_test.rest import judge_rest
+from gateway.control.self_test.rest import judge_rest, why_no_force
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import SelfTestResult, SelfTestVerdict
 from tests.control.bench import bsfm, settings
@@ -99,6 +99,32 @@ def test_the_slowest_exchange_is_the_slowest_wherever_it_was() -> None:
     for asked, wire_s in enumerate((0.01, 0.08, 0.01), start=1):
         watch.observe(LineStatus(wire_s=wire_s, output_counts=WireCounts(asked, asked, 0)))
     assert "the slowest within 80 ms of 100 ms" in watch.findings(RIG, 1.0)[0].text
+
+
+def test_a_reading_that_waited_behind_another_is_counted_beside_it_and_no_reading_beside_itself() -> None:
+    """Of 100 readings a second one tick has taken two."""
+    watch, heard = LineWatch(), 0
+    for k in range(60):
+        heard += 2 if k == 30 else 1
+        watch.observe(LineStatus(cell_counts=WireCounts(0, heard, 0)))
+        watch.note_reading(0.01 * heard)
+    assert "100 readings per second, 0 missing, 0 unreadable, longest gap 10 ms" in watch.findings(RIG, 1.0)[1].text
+
+
+@pytest.mark.parametrize(("weight_n", "rest_n"), [(5.0, 1.5), (-5.0, -1.5)])
+def test_a_payload_excuses_a_force_at_rest_on_the_side_to_which_it_hangs_and_on_no_other(weight_n, rest_n) -> None:
+    assert judge_zero(rest_n, RIG, weight_n).verdict is FAILED
+    assert judge_zero(-rest_n, RIG, weight_n).verdict is PASSED
+
+
+@pytest.mark.parametrize(("rest_n", "why"), [(2.0, "the zero is off: tare first"), (-2.0, ""), (0.0, "")])
+def test_a_force_is_tried_behind_a_zero_that_is_off_below_nothing_for_it_may_be_the_sign(
+    rest_n: float, why: str
+) -> None:
+    rest = [(0.01 * k, rest_n + 0.05 * (-1) ** k) for k in range(100)]
+    found = {one.item: one for one in judge_rest(rest, MEASURED)}
+    assert (found[Item.ZERO].verdict is FAILED) is (rest_n != 0.0)
+    assert why_no_force(found, rest, MEASURED) == why
 
 
 @pytest.mark.parametrize("verdict", [PASSED, WARNED, FAILED])

@@ -138,10 +138,11 @@ def test_a_zero_that_is_none_and_the_lower_byte_first_are_those_of_both_ends() -
     usual = cell_device(profile, "N").frame(12.0)
     for changes in ({"zero_count": 5000.0}, {"frame": "{force:int32-cdab}"}):
         other = replace(profile, read_force=replace(profile.read_force, **changes))  # type: ignore[arg-type]
-        host, device = cell_host(other, unit="N"), cell_device(other, "N")
-        (sample,) = host.receive(device.frame(12.0), 0.0)
-        assert isinstance(sample, ForceSample)
-        assert sample.force_n == pytest.approx(12.0, abs=host.resolution_n)
+        for unit in ("kg", "N"):
+            host, device = cell_host(other, unit=unit), cell_device(other, unit)
+            (sample,) = host.receive(device.frame(12.0), 0.0)
+            assert isinstance(sample, ForceSample)
+            assert sample.force_n == pytest.approx(12.0, abs=host.resolution_n)
         assert device.frame(12.0) != usual
     assert device.frame(12.0)[:4] == usual[3::-1]
 

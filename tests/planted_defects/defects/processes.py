@@ -92,4 +92,11 @@ DEFECTS = (
     Defect("a simulated rig without ports is left alone", "service/supervisor/simulated_rig_child.py",
            "        self._child.kill()\n        self._child.wait()\n        self._on_death", "        self._on_death",
            ("service/supervisor/children/test_simulated_rig_child.py",)),
+    Defect("the service of a simulated rig may use real devices", "cli/system_service/installation.py",
+           "return () if rig.simulated else tuple(", "return tuple(", ("cli/system_service/test_devices_of_a_unit.py",)),
+    Defect("what says what no control process says is told without its code", "processes/exit_cause.py",
+           "    EndCause.NONSENSE: \"A499\",\n", "", ("processes/test_exit_cause.py",)),
+    Defect("on a disk that has become read-only nobody has the lock", "processes/state_lock.py",
+           "        if not path.exists():\n            raise\n        return open_plain(path)", "        raise",
+           ("processes/test_state_lock.py",)),
 )  # fmt: skip

@@ -161,4 +161,12 @@ DEFECTS = (
     Defect("a fall of the voltage waits for a question to the device about itself", "service/running_rig/lines/output_line.py",
            "return self._asked_v <= wanted_v != self._rest_v and", "return wanted_v != self._rest_v and",
            ("service/running_rig/lines/output/test_checks_begun_anew.py",)),
+    Defect("a fit that hangs is asked, and not killed", "service/running_rig/fit_launcher.py",
+           "os.killpg(self._process.pid, signal.SIGKILL)", "os.killpg(self._process.pid, signal.SIGTERM)",
+           ("service/fitting/test_fit_launcher.py",)),
+    Defect("half an hour behind a fit another process is killed", "service/running_rig/fit_launcher.py",
+           "        self._patience.cancel()\n", "", ("service/fitting/test_fit_launcher.py",)),
+    Defect("all that a rig's process has ever waited is one pause", "service/running_rig/lateness.py",
+           "waited_s = min(turns.waited_s - known.waited_s, now_s - self._rig_ran_s)",
+           "waited_s = min(turns.waited_s, now_s - self._rig_ran_s)", ("service/running_rig/test_lateness.py",)),
 )  # fmt: skip

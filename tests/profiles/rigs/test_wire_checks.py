@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from gateway.profiles import check_report, shipped_profiles_folder
+from gateway.profiles.rigs.checks.wire_times import _cycle_s
 from gateway.profiles.strict_yaml.text import parse
 
 POLLED = {"ask": "W?", "frame": "W {force:+08.2f}", "unit": "N"}
@@ -142,3 +143,19 @@ def test_a_display_of_raw_counts_ends_as_far_from_its_zero_as_a_push_can_go(
     for other in (0, -zero_count):
         faults, _ = told(tmp_path, **changes, rig__load_cell__zero_count=other)
         assert not faults
+
+
+@pytest.mark.parametrize(
+    ("took_s", "cycle_s"),
+    [
+        ({"set_voltage": 0.01, "read_pressure": 0.02, "read_voltage": 0.04, "identity": 0.08}, 0.03),
+        ({"set_voltage": 0.01, "read_voltage": 0.04}, 0.05),
+        ({"set_voltage": 0.01}, 0.01),
+        ({}, 0.0),
+    ],
+)
+def test_a_cycle_of_an_output_is_its_setting_and_the_question_that_the_loop_asks_behind_it(
+    took_s: dict[str, float], cycle_s: float
+) -> None:
+    """The pressure where the device measures one, else its setting; never both."""
+    assert _cycle_s(took_s) == pytest.approx(cycle_s)

@@ -43,6 +43,15 @@ def test_a_recording_lasts_from_its_first_row_to_its_last(tmp_path: Path) -> Non
     assert summary["duration_s"] == pytest.approx(2.0)
 
 
+def test_the_largest_setpoint_is_told_wherever_it_was(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "recordings", {}, ("time_s", "setpoint_n"))
+    for row, setpoint_n in enumerate((0.0, 12.0, 30.0, 5.0)):
+        recorder.append((0.1 * row, setpoint_n))
+    recorder.close()
+    (summary,) = list_summaries(tmp_path)
+    assert "3 changes of setpoint, up to 30 N" in summary["happened"]
+
+
 def test_of_two_limits_the_tighter_one_counts(tmp_path: Path) -> None:
     """What `service install` advises: bytes and days."""
     for _ in range(3):

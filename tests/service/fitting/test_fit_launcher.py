@@ -50,10 +50,29 @@ def test_a_fit_that_ends_without_a_result_is_a_refusal_and_no_exception(
 
 
 def test_a_fit_that_hangs_is_killed_with_all_that_it_has_started(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Until it has ended no other run may begin."""
+    """Until it has ended no other run may begin. A disk that hangs does not let it hear that it shall end."""
     monkeypatch.setattr(fit_launcher, "LONGEST_S", 0.3)
-    result, _ = heard(monkeypatch, "os.fork(); import signal; signal.pause()")
+    deaf = "os.fork(); import signal; signal.alarm(15); signal.signal(15, signal.SIG_IGN); signal.pause()"
+    result, _ = heard(monkeypatch, deaf)
     assert result["refused"].startswith("A331 the fit process was killed after 0.005 minutes without a result")
+
+
+def test_of_a_fit_that_has_ended_nothing_is_killed_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half an hour later another process may have its number."""
+    monkeypatch.setattr(fit_launcher, "module_command", lambda _: [sys.executable, "-S", "-c", "print('{}')"])
+    killed = list[object]()
+    monkeypatch.setattr(fit_launcher.os, "killpg", lambda *asked: killed.append(asked))
+
+    async def scene() -> Result:
+        results: asyncio.Queue[Result] = asyncio.Queue()
+        child = FitLauncher(Path("recording"), Path("rig"), Path("state"), results.put_nowait)
+        async with asyncio.timeout(10):
+            result = await results.get()
+        assert child._patience.cancelled()
+        child._process.wait()
+        return result
+
+    assert (asyncio.run(scene()), killed) == ({}, [])
 
 
 def test_a_fit_that_cannot_be_started_is_a_refusal_that_names_the_recording(

@@ -32,7 +32,7 @@ class Kernel:
         self._process = folder / str(PID)
         self._process.mkdir()
         self.now_s, self.waited_s = 100.0, 5.0
-        self.ran_ns = self.rig_waited_ns = 0
+        self.ran_ns, self.rig_waited_ns = 9_000_000_000, 3_000_000_000  # of a process that has run for long
         self.write("S")
         self.withheld = 0.0, ""
         counter = SimpleNamespace(note=lambda now_s: None, lately=lambda: self.withheld)

@@ -208,6 +208,19 @@ def test_a_broker_that_refuses_who_we_are_is_not_away() -> None:
     ]
 
 
+def test_a_refusal_between_them_begins_the_count_of_short_connections_anew() -> None:
+    """By its users somebody has just looked after: what comes behind is another story, and gets three connections again."""
+    said = list[str]()
+    news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: 0.0)
+    for lost in (news.note_lost, news.note_lost, news.note_refused, news.note_lost, news.note_lost):
+        news.note_connected()
+        lost("gone")
+    assert not [sentence for sentence in said if "within seconds" in sentence]
+    news.note_connected()
+    news.note_lost("gone")
+    assert len([sentence for sentence in said if "within seconds" in sentence]) == 1
+
+
 def test_what_the_broker_lets_nobody_hear_is_told_once_and_again_where_it_was_allowed_between() -> None:
     said = list[str]()
     news = BrokerNews("the MQTT broker b:1883", "force-gateway cell", said.append, lambda: 0.0)

@@ -163,7 +163,12 @@ def test_a_rest_must_be_broken_first_and_is_forgotten_then() -> None:
 
 def test_a_late_clock_shows_the_past_and_one_ahead_the_present() -> None:
     lagging = Plant(regulator=Regulator(lag_s=0.1))
-    for cell, past_s in ((LoadCell(clock_offset_s=0.02), 0.02), (LoadCell(clock_skew=0.1), 0.1 * 0.15)):
+    both = LoadCell(clock_offset_s=0.05, clock_skew=0.2)  # of what is late by the offset a share is lost
+    for cell, past_s in (
+        (LoadCell(clock_offset_s=0.02), 0.02),
+        (LoadCell(clock_skew=0.1), 0.1 * 0.15),
+        (both, 0.05 + 0.2 * 0.1),
+    ):
         late = replace(lagging, cell=cell)
         assert pressed(late, seconds=0.15).read() == pytest.approx(pressed(lagging, seconds=0.15 - past_s).read())
     ahead = replace(lagging, cell=LoadCell(clock_offset_s=-0.02))

@@ -1,15 +1,19 @@
 """Wiring and configuration: every value stands where the tab says, and secrets stay where they are."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from gateway.live.control_link import ControlLink
 from gateway.profiles import load_rig, shipped_profiles_folder
 from gateway.web.context import WebContext
+from gateway.web.register_table import register_table
 from gateway.web.tabs.configuration import _configuration
-from gateway.web.tabs.rig_values import HIDDEN, rig_document
+from gateway.web.tabs.rig_values import HIDDEN, _row, rig_document
 from gateway.web.tabs.wiring import wiring_document
 from tests.web.tabs.served_tabs import serve
 
@@ -108,3 +112,16 @@ def test_the_wiring_is_that_of_the_verb(page) -> None:
     answer = page.get("/api/v1/wiring").json
     assert answer["title"].startswith("Wiring of rig demo")
     assert any("mbpoll" in line for one in answer["sections"] for line in one["commands"])
+
+
+@pytest.mark.parametrize("name", ["token", "password", "broker_password", "key"])
+def test_no_value_is_shown_that_opens_something(name: str) -> None:
+    document: Any = SimpleNamespace(marks={})
+    assert _row(("mqtt", name), "s3cret", document)["value"] == HIDDEN
+    assert _row(("mqtt", name), "", document)["value"] != HIDDEN, "where none is set that is said"
+
+
+@pytest.mark.parametrize(("bind", "host"), [("0.0.0.0", ""), ("::", ""), ("192.168.1.7", "192.168.1.7")])
+def test_who_listens_on_every_address_is_reached_where_the_page_is(bind: str, host: str) -> None:
+    rig = load_rig("demo", simulated=True)
+    assert register_table(replace(rig, network=replace(rig.network, bind=bind)), 5020)["host"] == host

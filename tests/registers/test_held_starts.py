@@ -1,0 +1,80 @@
+"""What a host keeps up, was refused or was lost with, by itself: how long it counts, what ends it, and who is told."""
+
+import pytest
+
+from gateway.registers.writes.held_starts import HeldEnables, StartFrame
+
+HOST, CHANNEL = "10.0.0.1", ("10.0.0.1", "10.0.0.1", 40000, 0, 12)
+
+
+def frame(beat: int | None, setpoint: bytes = b"\x04\xb0", *, takes: bool = False) -> StartFrame:
+    return StartFrame(CHANNEL, (0, setpoint), beat, takes)
+
+
+def refused(beat: int = 7) -> HeldEnables:
+    held = HeldEnables()
+    held.note_refused(HOST, frame(beat), standing=beat, now_s=100.0)
+    return held
+
+
+@pytest.mark.parametrize(
+    ("sent", "repeats"),
+    [
+        (frame(7), True),
+        (frame(7, b"\0\0"), True),  # another setpoint, by a program that stands still in another place
+        (StartFrame((*CHANNEL[:3], 1, 2), (1, b"\0\0"), 7), True),  # in another frame of its
+        (frame(8), True),  # word for word the same, but for what the host's heartbeat register says
+        (frame(8, b"\0\0"), False),
+        (frame(None, b"\0\0"), True),  # of who beats, a frame without one tells nothing
+        (frame(7, takes=True), False),  # who is refused is told to take over
+    ],
+)
+def test_a_start_repeats_the_refused_one_by_its_heartbeat_or_its_words(sent: StartFrame, repeats: bool) -> None:
+    assert refused().repeats(HOST, sent, 100.5) is repeats
+    assert not refused().repeats("10.0.0.2", sent, 100.5)
+
+
+def test_a_frame_that_comes_on_and_on_is_the_refused_one_for_as_long_as_it_comes() -> None:
+    held = refused()
+    assert all(held.repeats(HOST, frame(7), 100.0 + 2.0 * k) for k in range(1, 6))
+    assert not held.repeats(HOST, frame(7), 113.5), "who has waited for three seconds has looked"
+
+
+def test_who_writes_enable_as_0_begins_anew_and_is_lost_no_more() -> None:
+    told = list[dict[str, list[int]]]()
+    held = refused()
+    held.on_lost = told.append
+    held.note_lost(HOST, 7)
+    held.let_go(HOST)
+    assert not held.repeats(HOST, frame(7), 100.5) and not held.knows(HOST)
+    assert told == [{HOST: [7]}, {}]
+
+
+def test_who_was_lost_in_the_process_before_begins_behind_another_heartbeat_and_not_by_the_one_of_then() -> None:
+    held = HeldEnables()
+    held.restore({}, {HOST: [7]}, 100.0)
+    assert held.repeats(HOST, frame(7), 100.5) and held.repeats(HOST, frame(None), 100.5)
+    held.hear(HOST, 7, CHANNEL)
+    assert held.repeats(HOST, frame(7), 100.5)
+    held.hear(HOST, 8, CHANNEL)
+    assert not held.repeats(HOST, frame(8), 100.5) and not held.knows(HOST)
+
+
+@pytest.mark.parametrize(("ago_s", "is_held"), [(-1.0, False), (0.0, True), (12.9, True), (13.1, False)])
+def test_what_was_held_in_the_process_before_counts_for_as_long_as_a_start_may_take(
+    ago_s: float, is_held: bool
+) -> None:
+    """Of a machine that was started anew its clock was another one: what lies ahead of now is of that."""
+    held = HeldEnables()
+    held.restore({HOST: 100.0 - ago_s}, {}, 100.0)
+    assert held.holds(HOST, 100.0) is is_held
+
+
+def test_the_next_process_is_told_of_a_held_enable_once_a_second_and_of_a_new_one_at_once() -> None:
+    told, held = list[dict[str, float]](), HeldEnables()
+    held.on_change = told.append
+    for k in range(21):
+        held.note(HOST, 100.0 + 0.1 * k)
+    held.note("10.0.0.2", 102.1)
+    assert [list(one.values()) for one in told] == [[100.0], [pytest.approx(101.0)], [pytest.approx(102.0)],
+                                                    [pytest.approx(102.0), 102.1]]  # fmt: skip
