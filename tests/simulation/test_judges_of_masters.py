@@ -104,7 +104,7 @@ def test_an_enable_and_a_run_at_the_machine_need_no_heartbeat_yet(observer: Obse
     judge.note_write(write_pdu(0, 1, 1200, 0, 0, 5), 1.0, is_answered=True)
     observer.disabled_s = None
     judge.look(1.28)
-    judge.note_local_run(1.3)
+    judge.renew(1.3)
     judge.look(1.5)
     assert observer.broken == []
     judge.look(1.7)

@@ -23,7 +23,8 @@ def frame_of(host: str, pdu: bytes) -> Frame:
 
 
 class LeaseJudge:
-    """Told of each write of a master: in its order, before the observer is."""
+    """Told of each write of a master: in its order, before the observer is. holder: whose write was the last that left enable
+    at 1."""
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
@@ -42,8 +43,7 @@ class LeaseJudge:
         """Who has taken over, and has not beaten since."""
         self._refused: dict[str, tuple[bytes, float]] = {}
         """Of each master the start, its heartbeat in it, that was refused last, and when."""
-        self._holder = ""
-        """Whose write was the last that left enable at 1."""
+        self.holder = ""
         self._left: dict[Frame, float] = {}
         """What the frames of the holder brought when control died; nothing once any of them has brought another heartbeat."""
 
@@ -65,7 +65,7 @@ class LeaseJudge:
             self._took.add(host)
         if control is not None:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
-            self._holder = host if self._is_enabled else ""
+            self.holder = host if self._is_enabled else ""
         if beat is not None:
             self._first_s.setdefault(frame, now_s)
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
@@ -109,7 +109,7 @@ class LeaseJudge:
         left = {
             frame: beat
             for frame, beat in self._brought.items()
-            if frame[0] == self._holder and self._first_s[frame] < told_s
+            if frame[0] == self.holder and self._first_s[frame] < told_s
         }
         self._left = {} if is_all else left or self._left
         self._refused.clear()
@@ -117,8 +117,8 @@ class LeaseJudge:
         self._first_s.clear()
         self._shown.clear()
 
-    def note_local_run(self, now_s: float) -> None:
-        """A run that a person watches at the machine needs no master."""
+    def renew(self, now_s: float) -> None:
+        """Who commands is there, as something else tells than a heartbeat that was taken."""
         self._renewed_s = max(self._renewed_s, now_s)
 
     def look(self, now_s: float) -> None:
