@@ -40,14 +40,29 @@ def test_a_frame_that_comes_on_and_on_is_the_refused_one_for_as_long_as_it_comes
     assert not held.repeats(HOST, frame(7), 113.5), "who has waited for three seconds has looked"
 
 
-def test_who_writes_enable_as_0_begins_anew_and_is_lost_no_more() -> None:
+@pytest.mark.parametrize(
+    ("sent", "at_s"), [(frame(7), 100.9), (frame(8), 100.5), (frame(7, b"\0\0"), 100.5), (frame(7, takes=True), 100.9)]
+)
+def test_who_writes_enable_as_0_begins_anew_and_is_lost_no_more(sent: StartFrame, at_s: float) -> None:
     told = list[dict[str, list[int]]]()
     held = refused()
     held.on_lost = told.append
     held.note_lost(HOST, 7)
     held.let_go(HOST)
-    assert not held.repeats(HOST, frame(7), 100.5) and not held.knows(HOST)
     assert told == [{HOST: [7]}, {}]
+    held.hear(HOST, 8, CHANNEL) if sent.heartbeat == 8 else None
+    assert not held.repeats(HOST, sent, at_s)
+
+
+def test_behind_a_0_a_refused_frame_that_comes_again_within_a_cycle_is_of_a_program_beside_who_wrote_it() -> None:
+    """Each of its frames: the last that was refused is the heartbeat's."""
+    held, beat = refused(), StartFrame((*CHANNEL[:3], 4, 2), (4, b"\0\x09"), 9)
+    held.note_refused(HOST, beat, standing=9, now_s=100.0)
+    held.let_go(HOST)
+    assert (
+        held.repeats(HOST, frame(7), 100.7) and held.repeats(HOST, beat, 101.4) and held.repeats(HOST, frame(7), 102.1)
+    )
+    assert not held.repeats(HOST, frame(7), 102.9)
 
 
 def test_who_was_lost_in_the_process_before_begins_behind_another_heartbeat_and_not_by_the_one_of_then() -> None:
