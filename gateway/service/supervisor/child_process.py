@@ -11,7 +11,8 @@ import select
 import signal
 import socket
 from dataclasses import dataclass, field
-from typing import Any, Final
+from itertools import pairwise
+from typing import Any, Final, NoReturn
 
 from gateway.processes import message_link as guardian_link
 from gateway.processes.module_command import module_command
@@ -20,6 +21,7 @@ from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
 _BLOCKED: Final = (signal.SIGHUP, signal.SIGINT)  # the guardian's to answer: some send them to every process
+_NO_PROGRAM: Final = 127
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
@@ -117,14 +119,35 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
 
 
 def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
-    for descriptor in passed:
-        os.set_inheritable(descriptor, True)
+    """Forked: behind posix_spawn and vfork the caller stands still until the program has been opened, however long its disk
+    takes, and a guardian that starts the watch again would see no control die meanwhile."""
+    mask = signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())  # none of the child's is taken for ours
     try:
-        null = [(os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0)]
-        return os.posix_spawn(command[0], command, os.environ, file_actions=null, setsid=True, setsigmask=_BLOCKED)
+        if pid := os.fork():
+            return pid
+        _become(command, passed)
     finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def _become(command: list[str], passed: tuple[int, ...]) -> NoReturn:
+    """Become another program, or end with the shell's code for one that is not there. What is not passed is closed before the
+    disk is waited for: control would not hear of the guardian's death by a line whose end is held here, too."""
+    try:
+        signal.set_wakeup_fd(-1)
+        os.setsid()
+        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+        kept = sorted({0, 1, 2, *passed})
+        for low, high in pairwise((*kept, os.sysconf("SC_OPEN_MAX"))):
+            os.closerange(low + 1, high)
         for descriptor in passed:
-            os.set_inheritable(descriptor, False)
+            os.set_inheritable(descriptor, True)
+        signal.pthread_sigmask(signal.SIG_SETMASK, _BLOCKED)
+        os.execve(command[0], command, os.environ)
+    except BaseException as error:
+        os.write(2, f"{command[0]}: {error}\n".encode(errors="replace"))
+    finally:
+        os._exit(_NO_PROGRAM)
 
 
 def reap_orphans(known: set[int]) -> None:
