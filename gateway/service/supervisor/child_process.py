@@ -10,6 +10,7 @@ import os
 import select
 import signal
 import socket
+import warnings
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final, NoReturn
@@ -123,7 +124,11 @@ def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
     takes, and a guardian that starts the watch again would see no control die meanwhile."""
     mask = signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())  # none of the child's is taken for ours
     try:
-        if pid := os.fork():
+        with warnings.catch_warnings(
+            action="ignore", category=DeprecationWarning
+        ):  # of 3.12: no lock is taken in the child
+            pid = os.fork()
+        if pid:
             return pid
         _become(command, passed)
     finally:
