@@ -10,19 +10,16 @@ import os
 import select
 import signal
 import socket
-import warnings
 from dataclasses import dataclass, field
-from itertools import pairwise
-from typing import Any, Final, NoReturn
+from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
-from gateway.processes.module_command import module_command
+from gateway.processes.module_command import module_command, start_program
 from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
 _BLOCKED: Final = (signal.SIGHUP, signal.SIGINT)  # the guardian's to answer: some send them to every process
-_NO_PROGRAM: Final = 127
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
@@ -106,7 +103,7 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
     try:
         with theirs:
             words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
-            pid = _spawn_process([*module_command(module), *words], (theirs.fileno(), *shared))
+            pid = start_program([*module_command(module), *words], theirs.fileno(), *shared, blocked=_BLOCKED)
         child = Child(ours, pid)
     except OSError:
         ours.close()
@@ -117,42 +114,6 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
         child.end()
         raise
     return child
-
-
-def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
-    """Forked: behind posix_spawn and vfork the caller stands still until the program has been opened, however long its disk
-    takes, and a guardian that starts the watch again would see no control die meanwhile."""
-    mask = signal.pthread_sigmask(signal.SIG_SETMASK, signal.valid_signals())  # none of the child's is taken for ours
-    try:
-        with warnings.catch_warnings(
-            action="ignore", category=DeprecationWarning
-        ):  # of 3.12: no lock is taken in the child
-            pid = os.fork()
-        if pid:
-            return pid
-        _become(command, passed)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-
-
-def _become(command: list[str], passed: tuple[int, ...]) -> NoReturn:
-    """Become another program, or end with the shell's code for one that is not there. What is not passed is closed before the
-    disk is waited for: control would not hear of the guardian's death by a line whose end is held here, too."""
-    try:
-        signal.set_wakeup_fd(-1)
-        os.setsid()
-        os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        kept = sorted({0, 1, 2, *passed})
-        for low, high in pairwise((*kept, os.sysconf("SC_OPEN_MAX"))):
-            os.closerange(low + 1, high)
-        for descriptor in passed:
-            os.set_inheritable(descriptor, True)
-        signal.pthread_sigmask(signal.SIG_SETMASK, _BLOCKED)
-        os.execve(command[0], command, os.environ)
-    except BaseException as error:
-        os.write(2, f"{command[0]}: {error}\n".encode(errors="replace"))
-    finally:
-        os._exit(_NO_PROGRAM)
 
 
 def reap_orphans(known: set[int]) -> None:

@@ -3,7 +3,6 @@
 import errno
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.service.supervisor import child_process
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit, reap_orphans, spawn_child
 from gateway.service.supervisor.event_wait import wait_readable
+from tests.processes.held_program import held_program
 from tests.service.supervisor.scripted_children import open_descriptors
 
 ROOM = 300
@@ -132,29 +132,18 @@ def test_nobody_is_killed_for_a_child_that_is_gone_or_not_born(start: Start, mon
     theirs.close()
 
 
-_HELD = (
-    "import fcntl, os, signal, sys; signal.signal(signal.SIGIO, signal.SIG_IGN); program = os.open(sys.argv[1], os.O_RDONLY); "
-    "fcntl.fcntl(program, fcntl.F_SETLEASE, fcntl.F_WRLCK); print('held', flush=True); "
-    "import select; select.select([sys.stdin], [], [], 3.0)"
-)
-"""Whoever opens this file waits, as for a disk that hangs."""
-
-
 def test_a_program_whose_disk_hangs_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """The guardian saw no control die, nor said the safe voltage, for as long as the disk took to open a helper's program."""
     program = tmp_path / "program"
     program.write_text("#!/bin/sh\nexit 7\n")
     program.chmod(0o700)
-    with subprocess.Popen(
-        [sys.executable, "-c", _HELD, str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as disk:
-        assert disk.stdin and disk.stdout and disk.stdout.readline() == b"held\n"
+    with held_program(program) as disk:
         monkeypatch.setattr(child_process, "module_command", lambda _: [str(program)])
         child = spawn_child("module", {})
         while len(held := {one.name for one in process_file(child, "fd").iterdir()}) > 4 and disk.poll() is None:
             time.sleep(0.001)
         is_hung = disk.poll() is None
-        disk.stdin.close()
+        disk.communicate()
         assert child.wait(10.0) == 7
         child.close()
     assert is_hung, "it came back behind the disk alone, or has kept more of ours than three streams and its line"
