@@ -50,7 +50,10 @@ def pack_state(state: Path, target: Path) -> list[str]:
     with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
         beside = Path(stream.name)
         try:
-            with tarfile.open(fileobj=stream, mode="w:gz", dereference=True) as archive:  # a second name is a file, too
+            with (
+                gzip.GzipFile(fileobj=stream, mode="wb", mtime=0) as packed,  # of a clock beyond 2106 it has no room
+                tarfile.open(fileobj=packed, mode="w", dereference=True) as archive,  # a second name is a file, too
+            ):
                 _add_manifest(archive, state)
                 for path in (path for path in _files(state) if _is_kept(path, state)):
                     with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile

@@ -7,6 +7,7 @@ found by the name of its key in a rig file, and by its looks in any text; who pa
 """
 
 import contextlib
+import gzip
 import io
 import json
 import platform
@@ -110,11 +111,12 @@ def parts_missing(parts: dict[str, str]) -> list[str]:
 
 
 def pack_bundle(parts: dict[str, str], target: Path) -> None:
-    """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind."""
+    """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind.
+    Without a time of its own, for which gzip has room until 2106, and a clock may be ahead of that."""
     target = replaced_by(target)
     beside = target.with_name(f".{target.name}.part")
     try:
-        with tarfile.open(beside, "w:gz") as archive:
+        with gzip.GzipFile(beside, "wb", mtime=0) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
             for name, text in parts.items():
                 data = text.encode()
                 member = tarfile.TarInfo(f"force-gateway-report/{name}")

@@ -162,7 +162,7 @@ NOTICES: Final = (
         "W252",
         "the clock cannot tell how old recordings are",
         "The clock was not set, or does not go with the ends of the recordings: `days` takes none, for a day where it seems "
-        "to be ahead.",
+        "to be ahead, or has leapt ahead.",
         "The machine has no battery for its clock and no time server, or stood still for longer than recordings are retained.",
         "date shows the clock; sudo timedatectl set-ntp true has it set by a time server. recordings keep N keeps one.",
     ),

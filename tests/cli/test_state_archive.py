@@ -219,3 +219,13 @@ def test_a_file_of_two_names_is_restored_as_both(state: Path, tmp_path: Path) ->
     unpack_state(tmp_path / "b.tar.gz", tmp_path / "again")
     for name in ("0001.yaml", "copy.yaml"):
         assert (tmp_path / "again" / "calibrations" / name).read_text() == "name: one\n"
+
+
+def test_a_clock_that_is_far_ahead_keeps_nobody_from_a_backup(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To 2126: gzip has room for a time until 2106."""
+    monkeypatch.setattr("time.time", lambda: 4.95e9)
+    packed = pack_state(state, tmp_path / "b.tar.gz")
+    assert packed == ["calibrations/0001.yaml"]
+    assert names_in(tmp_path / "b.tar.gz") == packed

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from gateway.cli.main import command
-from gateway.cli.support_bundle import Redaction, collect_parts
+from gateway.cli.support_bundle import Redaction, collect_parts, pack_bundle
 from gateway.processes.event import encode_event, make_event
 from gateway.processes.event_file import EventFile
 from gateway.profiles.http_sections import Web
@@ -218,3 +218,11 @@ def test_the_newest_events_go_in_and_what_each_part_is_named_by(
     assert [json.loads(line)["text"] for line in parts["events.jsonl"].splitlines()] == ["second", "third"]
     asked = {name: json.loads(parts[name])["asked"] for name in ("live.json", "health.json")}
     assert asked == {"live.json": "state", "health.json": "health"}
+
+
+def test_a_clock_that_is_far_ahead_keeps_nobody_from_a_bundle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To 2126: gzip has room for a time until 2106."""
+    monkeypatch.setattr("time.time", lambda: 4.95e9)
+    pack_bundle({"events": "all is well"}, tmp_path / "b.tar.gz")
+    with tarfile.open(tmp_path / "b.tar.gz") as archive:
+        assert archive.getnames() == ["force-gateway-report/events"]

@@ -2,7 +2,8 @@
 
 One that is years ahead would have them all deleted at once, one that nobody has set would keep them for ever; neither can be
 told from a long rest with certainty, and so it is said. What has ended a moment ago is no witness: it has its time from the
-clock that is doubted.
+clock that is doubted. One that leaps ahead while we look, by less than recordings are retained, makes some too old and not all:
+that is told by the monotonic clock.
 """
 
 import contextlib
@@ -26,6 +27,7 @@ class ClockDoubt(StrEnum):
     UNSET = "unset"
     BEHIND = "behind"
     AHEAD = "ahead"
+    LEAPT = "leapt"
 
 
 class Doubt(NamedTuple):
@@ -48,7 +50,7 @@ def doubt_clock(paths: Sequence[Path], days: float, now_s: float) -> Doubt:
         cure = f"{_CURE}, recordings delete N removes one"
         sentence = f"{clocks}: it is behind, or was ahead then. Such recordings do not go for their age; {cure}"
         return Doubt(ClockDoubt.BEHIND, f"W252 {sentence}")
-    fresh_s = min(_DAY_S, 0.5 * days * _DAY_S)
+    fresh_s = _fresh_s(days)
     ended_s, name = max((end for end in ends if end[0] < now_s - fresh_s), default=(now_s, ""))
     if CLOCK_SET_S <= ended_s < now_s - days * _DAY_S:
         which = f"recordings of more than {'a day' if fresh_s == _DAY_S else f'{fresh_s / 3600.0:g} h'} ago"
@@ -56,6 +58,22 @@ def doubt_clock(paths: Sequence[Path], days: float, now_s: float) -> Doubt:
         cure = f"If the clock is ahead, set it within a day: so long none goes for its age; {_CURE}"
         return Doubt(ClockDoubt.AHEAD, f"W252 by this machine's clock ({_date(now_s)}) {oldest}. {cure}")
     return Doubt(ClockDoubt.NONE)
+
+
+def doubt_leap(ahead_s: float, days: float, now_s: float) -> Doubt:
+    """Return what is odd about a clock that has gained ahead_s on the monotonic one. days: how long recordings are retained;
+    now_s: of the epoch."""
+    if ahead_s <= _fresh_s(days):
+        return Doubt(ClockDoubt.NONE)
+    leap = f"this machine's clock has leapt ahead by {ahead_s / _DAY_S:.1f} days, to {_date(now_s)}"
+    return Doubt(
+        ClockDoubt.LEAPT, f"W252 {leap}: no recording goes for its age for a day, so that it can be set; {_CURE}"
+    )
+
+
+def _fresh_s(days: float) -> float:
+    """Return what a clock may be off by without a doubt."""
+    return min(_DAY_S, 0.5 * days * _DAY_S)
 
 
 def _ended(paths: Sequence[Path]) -> list[tuple[float, str]]:

@@ -56,7 +56,7 @@ class CalibrationRuns:
         self._state = state
         self._clock = clock
         self._log = log
-        self.disk = DiskWorker()
+        self.disk, self.syncing = DiskWorker(), DiskWorker()
         self._continues: tuple[int, ...] = ()
         self._name = ""
         self._stairs = 0
@@ -227,6 +227,7 @@ class CalibrationRuns:
         if self._child:
             self._child.close()
         self.disk.close()
+        self.syncing.close()
 
     def _begin(self) -> None:
         run, rig = self._calibrating.recorded, self._rig
@@ -247,7 +248,9 @@ class CalibrationRuns:
         }
         columns = COLUMNS if isinstance(run, ExperimentRun) else (*COLUMNS, *LABELS)
         folder = self._state / RECORDINGS
-        self._recording = self._last = RunRecording(self.disk, lambda: Recorder(folder, header, columns), self._log)
+        self._recording = self._last = RunRecording(
+            self.disk, self.syncing, lambda: Recorder(folder, header, columns), self._log
+        )
         self._is_closing = False
         self._recording.begin(self._on_opened)
         self._continues, self._name = (), ""

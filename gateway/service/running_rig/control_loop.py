@@ -270,11 +270,11 @@ class ControlLoop:
             return self._make_safe(now_s)
 
     def _make_safe(self, now_s: float) -> Output:
-        """An exception of ours is being handled: the safe voltage, and a sentence."""
-        self._log("internal", f"A499 internal error, please report it; safe voltage written:\n{traceback.format_exc()}")
+        """An exception of ours is being handled: the safe voltage, then a sentence, for which a disk gives our source."""
         decision = self.controller.fail_internally(now_s)
         if not self.output_lost:
             self.output.set_voltage(decision.voltage_v, now_s)
+        self._log("internal", f"A499 internal error, please report it; safe voltage written:\n{traceback.format_exc()}")
         return decision
 
     def _step(self, now_s: float) -> None:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
-from gateway.processes.module_command import module_command
+from gateway.processes.module_command import module_command, start_program
 from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 
 _END_BOUND_S: Final = 1.0
@@ -103,7 +103,7 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
     try:
         with theirs:
             words = [str(theirs.fileno()), json.dumps(arguments).ljust(room)]
-            pid = _spawn_process([*module_command(module), *words], (theirs.fileno(), *shared))
+            pid = start_program([*module_command(module), *words], theirs.fileno(), *shared, blocked=_BLOCKED)
         child = Child(ours, pid)
     except OSError:
         ours.close()
@@ -114,17 +114,6 @@ def spawn_child(module: str, arguments: dict[str, Any], *shared: int, room: int 
         child.end()
         raise
     return child
-
-
-def _spawn_process(command: list[str], passed: tuple[int, ...]) -> int:
-    for descriptor in passed:
-        os.set_inheritable(descriptor, True)
-    try:
-        null = [(os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0)]
-        return os.posix_spawn(command[0], command, os.environ, file_actions=null, setsid=True, setsigmask=_BLOCKED)
-    finally:
-        for descriptor in passed:
-            os.set_inheritable(descriptor, False)
 
 
 def reap_orphans(known: set[int]) -> None:

@@ -1,5 +1,6 @@
 """What the guardian says, and how: it never waits for a terminal, and no closed pipe ends it. Standard library only."""
 
+import _thread
 import contextlib
 import json
 import os
@@ -26,20 +27,22 @@ def print_error(sentence: str) -> None:
 
 def print_ready(what: str | dict[str, Any]) -> None:
     """Print READY to stdout, for people or for a program. A reader that is gone (`| head -1`) is no reason to end, and one that
-    reads nothing (a paused terminal, a full pipe) has it once it reads: until then a thread waits, and not the guardian."""
+    reads nothing (a paused terminal, a full pipe) has it once it reads: until then a thread waits, and not the guardian. Nor is
+    the thread's beginning waited for, as threading.Thread does: one that has no memory to begin with never tells of it."""
     text = (what if isinstance(what, str) else json.dumps(what)) + "\n"
+    is_written = threading.Event()
     with contextlib.suppress(RuntimeError):  # no thread is to be had: nor is READY then
-        writer = threading.Thread(target=_write_out, args=(text.encode(errors="replace"),), daemon=True)
-        writer.start()
-        writer.join(_PATIENCE_S)
+        _thread.start_new_thread(_write_out, (text.encode(errors="replace"), is_written))
+        is_written.wait(_PATIENCE_S)
 
 
-def _write_out(data: bytes) -> None:
+def _write_out(data: bytes, is_written: threading.Event) -> None:
     """Past Python's own buffer: what stayed in there would be flushed, and waited for, at the guardian's end."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         descriptor = sys.stdout.fileno()
         while data:
             data = data[os.write(descriptor, data) :]
+    is_written.set()
 
 
 def ready_sentence(rig: str, where: str, pids: Mapping[str, int]) -> str:

@@ -37,7 +37,7 @@ class Stage:
         self.recordings = Recordings(self.state / "recordings", wired.rig, log, AtOnce())  # type: ignore[arg-type]
         wired.loop.recordings = self.recordings
         self.calibration_runs = CalibrationRuns(wired.controller, wired.rig, self.state, lambda: wired.now_s, log)
-        self.calibration_runs.disk = AtOnce()  # type: ignore[assignment]
+        self.calibration_runs.disk = self.calibration_runs.syncing = AtOnce()  # type: ignore[assignment]
         wired.loop.calibration_runs, self.calibration_runs.decide = self.calibration_runs, wired.loop.refresh
         self.upload = RigCalibrations(wired.rig, self.state).serve(wired.bank, lambda taken: None, log)
         self.upload.run_in_background = lambda work, done: None  # type: ignore[assignment]  # a disk that never answers

@@ -53,6 +53,17 @@ def test_a_reader_that_reads_nothing_is_not_waited_for(is_read):
     os.close(reader)
 
 
+def test_a_thread_that_never_begins_is_not_waited_for():
+    """As where an address space is used up: the thread dies before it can say so. The guardian hung for ever, and nobody
+    watched the control that it had just started."""
+    code = (
+        "import threading; threading.Thread._bootstrap = lambda thread: None; "
+        "from gateway.service.supervisor.guardian_sentences import print_ready; print_ready('READY')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], stdout=PIPE, timeout=5.0, check=True)
+    assert done.stdout == b"READY\n"
+
+
 def test_an_error_is_said_only_to_who_reads(monkeypatch):
     """A paused terminal is waited for a moment at most."""
     waits_s = []

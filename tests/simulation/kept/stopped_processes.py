@@ -147,4 +147,12 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.8913, "person", "say", data=b'{"do": "calibration", "use": 3}'),
         ],
     ),
+    (
+        516,  # behind a power cut nobody knows who had hung: the judge had remembered it
+        [
+            Event(6.1947, "worker", "hold", (16.18,)),
+            Event(6.5489, "worker", "hang", (38822.0,)),
+            Event(7.8692, "machine", "power_cut", (0.1, 0.0)),
+        ],
+    ),
 ]

@@ -219,7 +219,8 @@ class SimulatedService:
             self._outside.call_later(SERVICE_RESTART_S, self._start)
 
     def cut_power(self) -> None:
-        """All of it dies at once, without a word; the guardian is started again, and knows nothing of before."""
+        """All of it dies at once, without a word; the guardian is started again. That first: who judges asks at control's death
+        whether anybody is left who knows what it knew."""
         self.kill_guardian()
         self.kill_control()
 

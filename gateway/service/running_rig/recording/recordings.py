@@ -40,7 +40,7 @@ Opened = Callable[[RunRecording, OSError | None], None]
 
 
 class Recordings:
-    """Recordings of a rig: at most one open file, each under its time. disk: a thread by default. What is asked here is
+    """Recordings of a rig: at most one open file, each under its time. disk: two threads by default. What is asked here is
     answered by a future of the loop: it is done when the disk has done its part. on_wanted: told what is recorded, and goes
     on in the next process if this one dies; None: nothing any more."""
 
@@ -48,7 +48,7 @@ class Recordings:
         self._directory = directory
         self._rig = rig
         self._log = log
-        self._disk = disk or DiskWorker()
+        self._disk, self._syncing = disk or DiskWorker(), disk or DiskWorker()
         self._current: RunRecording | None = None
         self._closing: list[RunRecording] = []
         self._retention = RecordingRetention(directory.parent, rig.retention, log)
@@ -99,7 +99,9 @@ class Recordings:
             "simulated": rig.simulated,
             "seed": rig.seed,
         }
-        recording = RunRecording(self._disk, lambda: Recorder(self._directory, header, RUN_COLUMNS), self._log)
+        recording = RunRecording(
+            self._disk, self._syncing, lambda: Recorder(self._directory, header, RUN_COLUMNS), self._log
+        )
 
         def tell(error: OSError | None) -> None:
             if error and self._current is recording:
@@ -187,8 +189,8 @@ class Recordings:
         self._again.forget()
         ended = asyncio.wrap_future(self._stop())
         await asyncio.wait([ended], timeout=END_BOUND_S)  # not cancelled: the disk may still tell its end
-        self._retention.close()
-        self._disk.close()
+        for ending in (self._retention, self._disk, self._syncing):
+            ending.close()
 
     def status(self) -> Answer:
         """Return where the current recording is, how many rows it has there, and in which file it began; `waits`: why there is

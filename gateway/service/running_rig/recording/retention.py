@@ -1,8 +1,9 @@
 """Removes the recordings that the rig has no room for, at the start, every hour, and whenever
 one has become as long as one may be, in a thread beside the control loop.
 
-A clock by which all recordings are too old is not believed for a day: a machine whose clock was years ahead at its start would
-have lost everything before anybody, or a time server, could set it.
+A clock by which all recordings are too old is not believed for a day, nor one that has leapt ahead since it was looked at last:
+a machine whose clock was years ahead at its start, or was set wrong by hand, would have lost them before anybody, or a time
+server, could set it.
 """
 
 import time
@@ -12,12 +13,13 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.calibrations.kept_ladders import kept_ladders
+from gateway.live.standstill import suspended_s
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
 from gateway.profiles.recordings_section import Retention
 from gateway.progress import few
 from gateway.recording import recording_paths
-from gateway.recording.care.clock_doubt import ClockDoubt, doubt_clock
+from gateway.recording.care.clock_doubt import ClockDoubt, Doubt, doubt_clock, doubt_leap
 from gateway.recording.care.keeping import Prunable, prune_recordings
 from gateway.watch.reference_recording import read_reference_recording
 
@@ -34,6 +36,7 @@ class RecordingRetention:
         self._due_s = inf if retention.is_unlimited else -inf
         self._told = ClockDoubt.NONE
         self._doubted_s: float | None = None  # since when the clock seemed to be ahead
+        self._ahead_s = inf  # of the monotonic clock, when it was looked at last
 
     def tick(self, now_s: float) -> None:
         """Begin to prune where it is time; nothing waits for it. In a running loop, if there is a limit."""
@@ -60,16 +63,22 @@ class RecordingRetention:
         """Return the limits, without that of the age for a day once the clock seems to be ahead."""
         if self._retention.days is None:
             return self._retention
-        doubt = doubt_clock(recording_paths(self._state), self._retention.days, time.time())
+        doubt = self._doubt(self._retention.days, now_s)
         if doubt.sentence and doubt.kind is not self._told:
             self._log("recording", doubt.sentence)
         self._told = doubt.kind
-        if doubt.kind is ClockDoubt.AHEAD and self._doubted_s is None:
+        if doubt.kind is ClockDoubt.LEAPT or (doubt.kind is ClockDoubt.AHEAD and self._doubted_s is None):
             self._doubted_s = now_s
         is_doubted = self._doubted_s is not None and now_s < self._doubted_s + _DOUBT_S
         if doubt.kind is not ClockDoubt.AHEAD and not is_doubted:
             self._doubted_s = None  # the next leap is another one
         return replace(self._retention, days=None) if is_doubted else self._retention
+
+    def _doubt(self, days: float, now_s: float) -> Doubt:
+        wall_s, before_s = time.time(), self._ahead_s
+        self._ahead_s = wall_s - now_s - suspended_s()
+        doubt = doubt_clock(recording_paths(self._state), days, wall_s)
+        return doubt if doubt.kind is not ClockDoubt.NONE else doubt_leap(self._ahead_s - before_s, days, wall_s)
 
     def _tell(self, gone: Any) -> None:
         if isinstance(gone, BaseException):

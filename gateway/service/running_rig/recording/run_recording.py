@@ -1,8 +1,12 @@
-"""One recording of the running gateway: rows are gathered in the loop; a thread makes the file, writes, syncs and closes it.
+"""One recording of the running gateway: rows are gathered in the loop; a thread makes the file, writes and closes it, and
+another one syncs it.
 
 A disk that others keep busy holds up a write, and a new file even more, for as long as it likes: control stood still for 241 ms
 on a machine whose other processes synced files, and was ended for it. Rows wait in memory meanwhile; a disk that has taken
 nothing for HANGS_S ends the recording, never the control.
+
+A sync has a thread of its own, for it may take seconds where the kernel takes rows at once: behind one, control that was killed
+half a second after its recording had begun left not a row.
 """
 
 import contextlib
@@ -28,12 +32,12 @@ Log = Callable[[str, str], None]
 class RunRecording:
     """Called from the loop only; time_s of its rows counts from the first of them.
 
-    disk: does one thing after the other. make: of the file, in the thread.
+    disk, syncing: each does one thing after the other, syncing what nothing waits for. make: of the file, in the thread.
     """
 
-    def __init__(self, disk: DiskWorker, make: Callable[[], Recorder], log: Log) -> None:
+    def __init__(self, disk: DiskWorker, syncing: DiskWorker, make: Callable[[], Recorder], log: Log) -> None:
         self.rows = 0
-        self._disk, self._make, self._log = disk, make, log
+        self._disk, self._syncing, self._make, self._log = disk, syncing, make, log
         self._file: Recorder | None = None  # put there by the thread
         self._start_s: float | None = None
         self._gathered: list[tuple[float, ...]] = []
@@ -53,7 +57,6 @@ class RunRecording:
             opened(result if isinstance(result, OSError) else None)
 
         self._disk(self._open, tell)
-        self._begin(self._sync)
 
     @property
     def path(self) -> Path | None:
@@ -110,7 +113,6 @@ class RunRecording:
         self._closed = closed
         self._hand_over()
         self._give(lambda work: self._disk(work, lambda _: self._tell_closed()), lambda: self._close(drops_empty))
-        self._begin(self._sync)
 
     def _tell_closed(self) -> None:
         if closed := self._closed:
@@ -142,6 +144,7 @@ class RunRecording:
     def _open(self) -> None:
         if not self._is_hung:
             self._file = self._make()
+            self._begin_sync(self._file.path)
 
     def _write(self, rows: list[tuple[float, ...]]) -> None:
         if self._file:
@@ -155,11 +158,17 @@ class RunRecording:
             if drops_empty and not self._file.rows_written:
                 with contextlib.suppress(OSError):
                     self._file.path.unlink()
+            self._begin_sync(self._file.path)
 
-    def _sync(self) -> None:
-        if not self._file:
-            return
-        path = self._file.path
+    def _begin_sync(self, path: Path) -> None:
+        try:
+            self._syncing.begin(lambda: self._sync(path))
+        except OSError:  # no second thread, or the process ends
+            self._sync(path)
+
+    # -- in the thread that syncs
+
+    def _sync(self, path: Path) -> None:
         try:
             sync_recording(path)
         except FileNotFoundError:  # deleted meanwhile

@@ -31,7 +31,9 @@ def test_behind_its_end_nothing_of_a_rig_is_open_or_under_way(devices: OwnDevice
 
     async def scene(rig: RunningRig, guardian: socket.socket) -> None:
         await asyncio.wrap_future(rig._recordings.start())
-        for part in (rig._recordings._disk, rig._calibration_runs.disk, rig._upload._thread, rig._plants._thread):
+        recordings, runs = rig._recordings, rig._calibration_runs
+        recorders = (recordings._disk, recordings._syncing, runs.disk, runs.syncing)
+        for part in (*recorders, rig._upload._thread, rig._plants._thread):
             part.begin(lambda: None)
         rig._recordings._retention._worker.begin(lambda: None)
         while not rig._recordings.status()["rows"]:

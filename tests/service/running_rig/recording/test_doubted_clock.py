@@ -183,3 +183,30 @@ def test_where_recordings_stay_for_less_than_a_day_a_clock_is_doubted_by_those_o
     record(tmp_path, days_ago=ago_days)
     doubt = doubt_clock(recording_paths(tmp_path), 0.5, NOW_S)
     assert doubt.kind is kind and ("of more than 6 h ago" in doubt.sentence) is (kind is ClockDoubt.AHEAD)
+
+
+@pytest.mark.parametrize(("leap_days", "days", "lost"), [(6.5, 7.0, 5), (0.9, 7.0, 0), (30.0, 90.0, 0)])
+def test_a_clock_that_leaps_ahead_under_a_running_gateway_is_not_believed_for_a_day(
+    leap_days: float, days: float, lost: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By less than recordings are retained: the newest one seemed young enough, and all but it went."""
+    for days_ago in (6.0, 5.0, 4.0, 3.0, 2.0, 0.3):
+        record(tmp_path, days_ago=days_ago)
+    machine = Machine(tmp_path, Retention(days=days), monkeypatch)
+    assert machine.prune(0.0) == []
+    machine.wall_s = NOW_S + leap_days * DAY_S
+    assert machine.prune(3600.0) == machine.prune(7200.0) == machine.prune(0.9 * DAY_S) == []
+    assert [f"leapt ahead by {leap_days:.1f} days" in said for said in machine.said] == [True] * (leap_days > 1.0)
+    assert len(machine.prune(3700.0 + DAY_S)) == lost, "nobody has set it: it was right"
+
+
+def test_a_machine_that_sleeps_for_days_has_no_clock_that_leaps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for days_ago in (6.0, 0.3):
+        record(tmp_path, days_ago=days_ago)
+    machine = Machine(tmp_path, Retention(days=7.0), monkeypatch)
+    assert machine.prune(0.0) == []
+    machine.wall_s = NOW_S + 3.0 * DAY_S
+    monkeypatch.setattr(module, "suspended_s", lambda: 3.0 * DAY_S)
+    assert machine.prune(3600.0) == ["0001"] and not machine.said

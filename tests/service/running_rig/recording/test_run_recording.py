@@ -188,7 +188,7 @@ def test_the_loop_goes_on_while_a_thread_waits_for_the_disk(tmp_path: Path) -> N
 
     async def main() -> Path | None:
         worker, opened, closed = DiskWorker(), asyncio.Event(), asyncio.Event()
-        recording = RunRecording(worker, make, Log())
+        recording = RunRecording(worker, worker, make, Log())
         recording.begin(lambda error: opened.set())
         rows_until(recording, 1.0)  # type: ignore[arg-type]
         assert recording.path is None and not opened.is_set()
@@ -202,35 +202,6 @@ def test_the_loop_goes_on_while_a_thread_waits_for_the_disk(tmp_path: Path) -> N
     path = asyncio.run(main())
     assert path and read_recording(path).rows == 11
     join_disk_threads()  # it still syncs the file
-
-
-def test_a_file_is_put_on_the_disk_once_it_has_begun_and_once_it_has_ended(
-    tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without its header a file is nothing; a power cut in between may cost rows."""
-    synced: list[int] = []
-    monkeypatch.setattr(
-        "gateway.service.running_rig.recording.run_recording.sync_recording",
-        lambda path: synced.append(read_recording(path).rows),
-    )
-    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
-    recordings.start()
-    rows_until(recordings, 1.0)
-    assert synced == [0]
-    recordings.stop()
-    assert synced == [0, 11]
-
-
-def test_what_may_not_outlive_a_power_cut_is_said(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(path: Path) -> None:
-        raise OSError(5, "Input/output error")
-
-    monkeypatch.setattr("gateway.service.running_rig.recording.run_recording.sync_recording", refuse)
-    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
-    recordings.start()
-    assert "0001.fgr may not outlive a power cut: Input/output error" in log[0]
-    assert recordings.status()["recording"]
-    recordings.stop()
 
 
 def test_a_disk_that_is_always_one_batch_behind_does_not_hang(recordings: Recordings, disk: HangingDisk) -> None:

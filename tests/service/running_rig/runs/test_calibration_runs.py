@@ -31,7 +31,7 @@ def kept(wired: Wired, state: Path) -> CalibrationRuns:
         lambda: wired.now_s,
         lambda cause, sentence: wired.log.append((wired.now_s, sentence)),
     )
-    runs.disk = AtOnce()  # type: ignore[assignment]
+    runs.disk = runs.syncing = AtOnce()  # type: ignore[assignment]
     wired.loop.calibration_runs, runs.decide = runs, wired.loop.refresh
     wired.run(0.1)
     return runs
@@ -118,7 +118,7 @@ def test_the_end_of_a_run_is_told_once_its_file_is_closed(tmp_path: Path) -> Non
     """Whoever follows it reads the file then."""
     wired = Wired().ready()
     runs = kept(wired, tmp_path)
-    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    disk = runs.disk = runs.syncing = HangingDisk()  # type: ignore[assignment]
     runs.answer({"plan": PLAN})
     wired.run(1.0)
     runs.answer({"stop": True})
@@ -153,7 +153,7 @@ def fits(monkeypatch: pytest.MonkeyPatch) -> Fits:
 def on_a_hanging_disk(state: Path) -> tuple[SmallRig, CalibrationRuns, HangingDisk]:
     rig = SmallRig()
     runs = CalibrationRuns(rig.controller, demo(), state, rig.now, rig.note)
-    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    disk = runs.disk = runs.syncing = HangingDisk()  # type: ignore[assignment]
     rig.loop.calibration_runs = runs
     return rig, runs, disk
 

@@ -108,7 +108,7 @@ def test_of_a_self_test_nothing_is_told_that_the_ladder_before_it_has_left(tmp_p
     """A robot's stop of it was told with that ladder's sentence, recording and calibration."""
     rig = SmallRig(replace(settings(), self_test=SelfTestSettings(force_n=15.0)))
     runs = CalibrationRuns(rig.controller, demo(), tmp_path, rig.now, rig.note)
-    disk = runs.disk = HangingDisk()  # type: ignore[assignment]
+    disk = runs.disk = runs.syncing = HangingDisk()  # type: ignore[assignment]
     rig.loop.calibration_runs = runs
     rig.write(0, CALIBRATE)
     rig.run(0.5)

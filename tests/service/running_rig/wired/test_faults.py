@@ -177,6 +177,16 @@ def test_a_defect_of_ours_is_the_safe_voltage_a_latched_fault_and_a_sentence(mon
     assert_heals_after_reset(wired)
 
 
+def test_the_safe_voltage_does_not_wait_for_the_sentence_about_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It quotes our source, which a disk that hangs does not give."""
+    wired, settings = at_twenty(), list[float]()
+    monkeypatch.setattr(wired.controller, "decide", lambda *arguments: 1 / 0)
+    monkeypatch.setattr(wired.loop.output, "set_voltage", lambda voltage_v, now_s: settings.append(voltage_v))
+    monkeypatch.setattr("traceback.format_exc", lambda: f"{settings} V were set")
+    wired.write(1, 2500)
+    assert wired.said("A499")[0].endswith("\n[0.0] V were set")
+
+
 def test_a_defect_in_the_reasons_of_a_decision_is_the_safe_voltage_too(monkeypatch: pytest.MonkeyPatch) -> None:
     wired = at_twenty()
     with monkeypatch.context() as patched:

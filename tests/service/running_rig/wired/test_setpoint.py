@@ -212,7 +212,8 @@ class Rows:
     """The recorder's place in the gateway, with a real file behind it."""
 
     def __init__(self, directory: Path) -> None:
-        self._run = RunRecording(AtOnce(), lambda: Recorder(directory, {"rig": "demo"}, COLUMNS), lambda *said: None)
+        disk = AtOnce()
+        self._run = RunRecording(disk, disk, lambda: Recorder(directory, {"rig": "demo"}, COLUMNS), lambda *said: None)
         self._run.begin(lambda error: None)
 
     def append(self, sample: ForceSample, decision: Output, line: LineState) -> None:

@@ -4,6 +4,7 @@ import errno
 import os
 import signal
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.service.supervisor import child_process
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit, reap_orphans, spawn_child
 from gateway.service.supervisor.event_wait import wait_readable
+from tests.processes.held_program import held_program
 from tests.service.supervisor.scripted_children import open_descriptors
 
 ROOM = 300
@@ -130,19 +132,48 @@ def test_nobody_is_killed_for_a_child_that_is_gone_or_not_born(start: Start, mon
     theirs.close()
 
 
+def test_a_program_whose_disk_hangs_is_not_waited_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The guardian saw no control die, nor said the safe voltage, for as long as the disk took to open a helper's program."""
+    program = tmp_path / "program"
+    program.write_text("#!/bin/sh\nexit 7\n")
+    program.chmod(0o700)
+    with held_program(program) as disk:
+        monkeypatch.setattr(child_process, "module_command", lambda _: [str(program)])
+        child = spawn_child("module", {})
+        while len(held := {one.name for one in process_file(child, "fd").iterdir()}) > 4 and disk.poll() is None:
+            time.sleep(0.001)
+        is_hung = disk.poll() is None
+        disk.communicate()
+        assert child.wait(10.0) == 7
+        child.close()
+    assert is_hung, "it came back behind the disk alone, or has kept more of ours than three streams and its line"
+    assert {"0", "1", "2"} < held
+
+
+def test_a_program_that_is_not_there_ends_as_a_shell_tells_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(child_process, "module_command", lambda _: [str(tmp_path / "none")])
+    child = spawn_child("module", {})
+    assert child.wait(10.0) == 127
+    child.close()
+    assert "No such file" in capfd.readouterr().err
+
+
 def no_room(*_: object, **__: object) -> int:
     raise OSError(errno.EMFILE, "Too many open files")
 
 
 def test_a_child_that_cannot_be_followed_does_not_stay(start: Start, monkeypatch) -> None:
     spawned: list[int] = []
-    spawn, before = os.posix_spawn, open_descriptors()
+    fork, before = os.fork, open_descriptors()
 
-    def noted(*arguments: object, **options: object) -> int:
-        spawned.append(spawn(*arguments, **options))  # type: ignore[arg-type]
-        return spawned[-1]
+    def noted() -> int:
+        if pid := fork():
+            spawned.append(pid)
+        return pid
 
-    monkeypatch.setattr(os, "posix_spawn", noted)
+    monkeypatch.setattr(os, "fork", noted)
     monkeypatch.setattr(os, "pidfd_open", no_room)
     with pytest.raises(OSError, match="Too many"):
         start("time.sleep(1)")
@@ -156,7 +187,7 @@ def test_a_child_that_cannot_be_followed_does_not_stay(start: Start, monkeypatch
 
 def test_a_child_that_there_is_no_process_for_leaves_no_descriptor(start: Start, monkeypatch) -> None:
     before = open_descriptors()
-    monkeypatch.setattr(os, "posix_spawn", no_room)
+    monkeypatch.setattr(os, "fork", no_room)
     with pytest.raises(OSError, match="Too many"):
         start("")
     assert open_descriptors() == before
