@@ -168,7 +168,7 @@ DEFECTS = (
            "return self._asked_v <= wanted_v != self._rest_v and", "return wanted_v != self._rest_v and",
            ("service/running_rig/lines/output/test_checks_begun_anew.py",)),
     Defect("a fit that hangs is asked, and not killed", "service/running_rig/fit_launcher.py",
-           "os.killpg(self._process.pid, signal.SIGKILL)", "os.killpg(self._process.pid, signal.SIGTERM)",
+           "os.killpg(self.pid, signal.SIGKILL)", "os.killpg(self.pid, signal.SIGTERM)",
            ("service/fitting/test_fit_launcher.py",)),
     Defect("half an hour behind a fit another process is killed", "service/running_rig/fit_launcher.py",
            "        self._patience.cancel()\n", "", ("service/fitting/test_fit_launcher.py",)),

@@ -91,8 +91,9 @@ def test_of_a_fit_that_has_ended_nothing_is_killed_later(monkeypatch: pytest.Mon
         child = FitLauncher(Path("recording"), Path("rig"), Path("state"), results.put_nowait)
         async with asyncio.timeout(10):
             result = await results.get()
-        assert child._patience.cancelled()
-        child._process.wait()
+            assert child._patience.cancelled()
+            while not child.is_reaped:
+                await asyncio.sleep(0.005)
         return result
 
     assert (asyncio.run(scene()), killed) == ({}, [])
