@@ -46,6 +46,7 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ),
         ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
         ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
+        ("[{port: /dev/ttyS9}]", "fieldbus[0]: has no type: it says what this is, one of rtu, tls"),
         (
             "[{type: rtu, port: /dev/ttyS9, ca: a}]",
             "fieldbus[0].ca: is not a known key here; it belongs to a face of `type: tls`",
