@@ -52,6 +52,9 @@ _MOST_KEYS: Final = 6  # of a group, in a sentence
 _ONLY_CHOICE: Final = ", the only choice"
 _SECRETS: Final = ("token", "password", "password_file")  # a password may stand in place of its file
 
+_PATH_OF_A_DEVICE: Final = "the path of a device, such as /dev/serial/by-id/usb-..."
+_TCP_PORT: Final = "the number of a TCP port; a serial line is a face of `type: rtu`"
+
 
 class _Secret(str):
     """A value that no fault may quote: the journal, the events and a support bundle tell faults."""
@@ -299,6 +302,13 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
 }
 
 
+def _wanted_port(finding: str, value: Any) -> str:
+    """Return what a port is where a number stands in place of a path, or a path in place of a number; empty otherwise."""
+    if finding == "string_type" and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return _PATH_OF_A_DEVICE
+    return _TCP_PORT if finding == "int_type" and str(value).startswith("/") else ""
+
+
 def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional: bool = False) -> str:
     """Return the sentence for one pydantic error about a value that is there; value as the file has it. optional: the key may
     be left out."""
@@ -307,5 +317,7 @@ def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional
         return "has no value: write one, or leave this line out" if optional else "has no value"
     if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = _Secret(value)
+    if key == "port" and (wanted := _wanted_port(error["type"], value)):
+        return f"{quote_value(value)} is not {wanted}"
     words = _BY_TYPE.get(error["type"])
     return words(value, context, unit_of(key)) if words else f"{quote_value(value)}: {error['msg']}"
