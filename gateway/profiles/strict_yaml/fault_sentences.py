@@ -35,6 +35,7 @@ _WITH_UNIT: Final = re.compile(rf"({_DECIMAL.pattern}) ?(?P<unit>[^\W\d]\S*)")
 _FORMS: Final = {
     "^[a-z0-9][a-z0-9._-]{0,62}$": "small letters a-z, digits and . _ -, at most 63, a letter or digit first",
     "^/": "an absolute path, with / first",
+    r"^([^/:\s]+|[0-9A-Fa-f:.]+)$": "a name or an address, without mqtt:// and without its port",
     r"^[^/#+\x00]{1,100}$": "1 to 100 characters, none of them / # +",
     r"^[^/#+\x00][^#+\x00]{0,199}$": "1 to 200 characters, none of them # +, and no / first",
 }
@@ -306,7 +307,7 @@ def _wanted_port(finding: str, value: Any) -> str:
     """Return what a port is where a number stands in place of a path, or a path in place of a number; empty otherwise."""
     if finding == "string_type" and isinstance(value, (int, float)) and not isinstance(value, bool):
         return _PATH_OF_A_DEVICE
-    return _TCP_PORT if finding == "int_type" and str(value).startswith("/") else ""
+    return _TCP_PORT if finding == "int_type" and isinstance(value, str) and value.startswith("/") else ""
 
 
 def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional: bool = False) -> str:

@@ -189,6 +189,18 @@ def test_no_quotes_or_brackets_are_proposed_where_they_are_refused(new: str, sen
     assert fault.split(" ", 1)[1] == sentence
 
 
+@pytest.mark.parametrize("host", ["broker.cell-3.local", "10.0.0.5", "fd00::5", "::1"])
+def test_a_broker_is_a_name_or_an_address(host: str) -> None:
+    assert told(("registers: force-v1", f'mqtt: {{host: "{host}"}}\nregisters: force-v1')) == []
+
+
+@pytest.mark.parametrize("host", ["mqtt://broker", "broker:1883", "my broker"])
+def test_a_broker_with_more_than_its_name_is_refused(host: str) -> None:
+    (fault,) = told(("registers: force-v1", f'mqtt: {{host: "{host}"}}\nregisters: force-v1'))
+    form = "a name or an address, without mqtt:// and without its port"
+    assert fault.endswith(f' mqtt.host: "{host}" does not have the form: {form}')
+
+
 def test_of_a_hostile_document_no_proposal_is_tried() -> None:
     """50 findings in 20 000 entries took five seconds: each proposal reads all of them."""
     faults = told(("registers: force-v1", f"fieldbus: [{'{type: rtu, port: true}, ' * 2000}]\nregisters: force-v1"))
