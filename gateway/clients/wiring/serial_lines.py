@@ -99,16 +99,17 @@ def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section
 
 def _tls_section(place: int, face: TlsFace, options: str) -> Section:
     port = face.port or "a free port, which `run` names when it is ready"
+    host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
+    shown = f"[{host}]" if ":" in host else host
     rows = (
         ("what", "value"),
-        ("address", f"{face.bind}:{port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
+        ("address", f"{shown}:{port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
         ("may connect", ", ".join(map(str, face.allow)) or "nobody but this machine"),
         ("gateway's files", f"{face.certificate}, {face.key}"),
         ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
-    host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
-    where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{options}"
+    where = f"{shown}:{face.port or 'PORT'}{options}"
     try_it = (
         f"force-gateway read state --gateway {where} --tls {quote(str(face.ca))} --cert CLIENT.crt --key CLIENT.key"
     )

@@ -92,6 +92,17 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     assert " --gateway [fd00::5]:802 " in line
 
 
+@pytest.mark.parametrize(("bind", "told"), [("0.0.0.0", "GATEWAY-ADDRESS:802,"), ("fd00::5", "[fd00::5]:802,")])
+def test_an_address_of_the_page_is_one_to_connect_to(bind: str, told: str) -> None:
+    """A face of every address was told as 0.0.0.0, one of IPv6 without brackets; the command below it had it right."""
+    face = TlsFace(type="tls", port=802, certificate="gateway.crt", key="gateway.key", ca="ca.crt", bind=bind)
+    rig = load_rig("demo")
+    rig = replace(rig, fieldbus=(face,), network=replace(rig.network, bind=bind, port=802))
+    sections = wiring_page(rig, "demo")[1]
+    shown = [row[1] for each in sections for row in each.rows if row[0] == "address"]
+    assert [one.partition(" ")[0] for one in shown] == [told, told]
+
+
 def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp_path: Path) -> None:
     text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("units: [0, 1, 255]", "units: [7]")
     (tmp_path / "own.yaml").write_text(text)
