@@ -104,9 +104,15 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
         elsewhere |= getattr(holder, "KEPT_ELSEWHERE", {})
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
-    if written := getattr((finding.get("ctx") or {}).get("error"), "written", ""):
+    error = (finding.get("ctx") or {}).get("error")
+    if written := getattr(error, "written", ""):
         place = _place_of(written, document, place)
-    return document.fault(place, _sentence(kind, document, path, place, finding))
+    fault = document.fault(place, _sentence(kind, document, path, place, finding))
+    there = (key for key in getattr(error, "misfits", ()) if (*place, key) in document.marks)
+    if misfit := next(there, ""):  # its sentence names the key: the line alone is told
+        mark = document.marks[(*place, misfit)]
+        fault = replace(fault, line=mark.key_line, column=mark.key_column)
+    return fault
 
 
 def _place_of(text: str, document: Document, group: Path) -> Path:
