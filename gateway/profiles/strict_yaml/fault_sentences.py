@@ -171,6 +171,8 @@ def _hint(value: Any, what: str, unit: str) -> str:
         return f': write "{number(value)}" in quotes'
     if what == "a list" and isinstance(value, (int, str)) and len(str(value)) <= _SHORT:
         return f": write [{quote_value(value)}]"
+    if what == "text" and isinstance(value, dict):
+        return ": quote a text that begins with `{`"
     if what == "a list" and isinstance(value, dict):
         return ": write `- ` before its first key, and spaces before the others"
     if isinstance(value, _Secret) and what == "text":
@@ -315,7 +317,8 @@ def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional
     be left out."""
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
-        return "has no value: write one, or leave this line out" if optional else "has no value"
+        comment = "; behind a `#` is a comment: quote a text with it" if error["type"] == "string_type" else ""
+        return ("has no value: write one, or leave this line out" if optional else "has no value") + comment
     if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = _Secret(value)
     if key == "port" and (wanted := _wanted_port(error["type"], value)):

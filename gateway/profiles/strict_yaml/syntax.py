@@ -21,6 +21,13 @@ class _Meaning(NamedTuple):
     is_where_opened: bool = False
 
 
+_BLOCK_PARTS: Final = (
+    "comment or line break",
+    "comment or a line break",
+    "indentation indicator",
+    "chomping or indentation",
+)
+_TAG_PARTS: Final = ("expected whitespace or line break", "expected ' ', but found")
 _TOO_DEEP: Final = "nested deeper than any profile"
 _MEANINGS: Final = tuple(
     _Meaning(*row)
@@ -45,6 +52,11 @@ _MEANINGS: Final = tuple(
         ("control characters are not allowed", "a control character that no text editor shows: delete it"),
         ("special characters are not allowed", "a control character that no text editor shows: delete it"),
         ("expected alphabetic", "`*` and `&` name a value of YAML: quote the text that begins so", True),
+        *(
+            (part, "`>` and `|` begin text on the lines below them: quote the text that begins so", True)
+            for part in _BLOCK_PARTS
+        ),
+        *((part, "tags (`!...`) are not used here; quote the text", True) for part in _TAG_PARTS),
         ("that cannot start any token", "a value cannot begin with this character: quote the text"),
         ("<document start>", "nothing can follow here: check the spaces before the keys"),
     )
