@@ -28,6 +28,11 @@ class Endpoint:
         return str(self.port or "PORT")
 
     @property
+    def shown(self) -> str:
+        """Address and port as programs take them: an IPv6 address in brackets."""
+        return f"{f'[{self.host}]' if ':' in self.host else self.host}:{self.shown_port}"
+
+    @property
     def unit_option(self) -> str:
         """Return what our own verbs need beside the address where the rig answers other units only."""
         return "" if self.unit == defaults.UNIT_ID else f" --unit {self.unit}"

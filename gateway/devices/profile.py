@@ -20,6 +20,7 @@ from gateway.devices.device_checks.identity import Identity
 from gateway.devices.device_checks.watchdog import Watchdog
 from gateway.devices.exchange import Exchange, PressureExchange, Refusals, Span, Step, VoltageExchange
 from gateway.devices.fields import NUMBERS, Choice, Decimals, Field, Plain, RegisterNumber, Scientific, TemplateError
+from gateway.devices.fields.field import ProfileMisfit
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.line_settings import SerialSettings
 from gateway.devices.template import compile_template, quote
@@ -100,7 +101,7 @@ class DeviceProfile:
         if self.role is DeviceRole.VALVE:
             _check_valve(self)
         elif self.set_valve or self.read_valve:
-            raise ValueError("set_valve and read_valve belong to a valve")
+            raise ProfileMisfit(("set_valve", "read_valve"), "set_valve and read_valve belong to a valve")
         elif self.role is DeviceRole.OUTPUT:
             _check_output(self)
         else:
@@ -207,7 +208,7 @@ def _check_codec(profile: DeviceProfile) -> None:
         if exchange and profile.is_modbus is (exchange.modbus is None):
             cure = _NO_TCP if "tcp" in profile.codec.lower() else f"say `codec: {MODBUS_RTU}`"
             wanted = "needs `modbus` with its registers" if profile.is_modbus else f"has `modbus`: {cure}"
-            raise ValueError(f"{name} of codec {profile.codec} {wanted}")
+            raise ProfileMisfit((name,), f"{name} of codec {profile.codec} {wanted}")
     if not (profile.is_modbus or profile.is_raw):
         if not profile.terminator:
             raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
@@ -215,21 +216,20 @@ def _check_codec(profile: DeviceProfile) -> None:
             raise ValueError("terminator and question_terminator are ASCII text")
         return
     if profile.terminator or profile.question_terminator or profile.checksum != "none" or profile.read_over:
-        raise ValueError(
-            "a frame of Modbus RTU or of raw bytes has its own end: leave terminator, checksum and read_over out"
-        )
+        sentence = "a frame of Modbus RTU or of raw bytes has its own end: leave terminator, checksum and read_over out"
+        raise ProfileMisfit(("terminator", "question_terminator", "checksum", "read_over"), sentence)
     if profile.is_raw:
         return
     if profile.reply_timeout_s > _LONGEST_MODBUS_S:
-        raise ValueError(
-            f"reply_timeout_s of a Modbus device is at most {_LONGEST_MODBUS_S} s: the force loop waits for it"
-        )
+        most = f"reply_timeout_s of a Modbus device is at most {_LONGEST_MODBUS_S} s: the force loop waits for it"
+        raise ProfileMisfit(("reply_timeout_s",), most)
     address = str(profile.constants.get(ADDRESS, 1))
     if not (address.isdecimal() and 1 <= int(address) <= _LARGEST_UNIT):
-        raise ValueError(f"address {address}: a Modbus unit is 1 to {_LARGEST_UNIT}")
+        raise ProfileMisfit(("constants",), f"address {address}: a Modbus unit is 1 to {_LARGEST_UNIT}")
 
 
 _EXCHANGES: Final = ("set_voltage", "read_voltage", "read_pressure", "read_force", "stream")
+_OF_OUTPUT: Final = (*_EXCHANGES[:3], "steps")
 
 
 def _check_output(profile: DeviceProfile) -> None:
@@ -238,7 +238,7 @@ def _check_output(profile: DeviceProfile) -> None:
     check_direction(profile.set_voltage.modbus, reads=False)
     check_direction(profile.read_voltage.modbus if profile.read_voltage else None, reads=True)
     if profile.stream or profile.read_force:
-        raise ValueError("stream and read_force belong to a load cell")
+        raise ProfileMisfit(("stream", "read_force"), "stream and read_force belong to a load cell")
     _check_setting(profile, profile.set_voltage.ask)
     if profile.set_voltage.answer:
         profile.number_in(profile.set_voltage.answer)
@@ -293,37 +293,37 @@ def _check_valve(profile: DeviceProfile) -> None:
     if any(getattr(profile, name) for name in _EXCHANGES) or profile.steps:
         raise ValueError("set_voltage, read_voltage, read_pressure, read_force, stream and steps belong to other roles")
     if profile.watchdog != "none":
-        raise ValueError("watchdog belongs to an output")
+        raise ProfileMisfit(("watchdog",), "watchdog belongs to an output")
     if profile.read_over:
-        raise ValueError("read_over belongs to an output or a load cell")
+        raise ProfileMisfit(("read_over",), "read_over belongs to an output or a load cell")
     _check_unasked(profile, "a valve")
 
 
 def _check_unasked(profile: DeviceProfile, what: str) -> None:
     """Whoever wrote a question believes that it is asked."""
     if profile.identity != "none":
-        raise ValueError(f"{what} is never asked what it is: leave identity out, for nobody would see another device")
+        cure = "leave identity out, for nobody would see another device"
+        raise ProfileMisfit(("identity",), f"{what} is never asked what it is: {cure}")
 
 
 def _check_load_cell(profile: DeviceProfile) -> None:
     if (profile.stream is None) == (profile.read_force is None):
-        raise ValueError("a load cell has either stream or read_force")
+        raise ProfileMisfit(("stream",), "a load cell has either stream or read_force")
     if profile.set_voltage or profile.read_voltage or profile.read_pressure or profile.steps:
-        raise ValueError("set_voltage, read_voltage, read_pressure and steps belong to an output")
+        raise ProfileMisfit(_OF_OUTPUT, f"{', '.join(_OF_OUTPUT[:-1])} and {_OF_OUTPUT[-1]} belong to an output")
     if profile.watchdog != "none":
-        raise ValueError("watchdog belongs to an output: a load cell drives nothing")
+        raise ProfileMisfit(("watchdog",), "watchdog belongs to an output: a load cell drives nothing")
     if profile.stream and profile.stream.ask:
-        raise ValueError("a stream is not asked: leave `ask` out, or say read_force in place of stream")
+        raise ProfileMisfit(("stream",), "a stream is not asked: leave `ask` out, or say read_force in place of stream")
     if profile.stream and profile.stream.rate_hz <= 0:
-        raise ValueError("rate_hz of stream is missing: how many readings a second it sends")
+        raise ProfileMisfit(("stream",), "rate_hz of stream is missing: how many readings a second it sends")
     if profile.stream:
         _check_unasked(profile, "a load cell that streams")
     if profile.read_force and not profile.read_force.ask:
-        raise ValueError("read_force needs an ask")
+        raise ProfileMisfit(("read_force",), "read_force needs an ask")
     for text, _ in profile.reading.beyond_range:
-        if any(
-            one.name not in profile.constants and not isinstance(one, Choice) for one in compile_template(text).fields
-        ):
+        free = (one for one in compile_template(text).fields if one.name not in profile.constants)
+        if not all(isinstance(one, Choice) for one in free):
             raise TemplateError(
                 f"{quote(text)} of overload or underload carries no number and no text: nothing changes in it but words and "
                 "constants"

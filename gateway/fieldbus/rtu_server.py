@@ -157,6 +157,8 @@ class ModbusRtuServer:
         self._timer = None
         if monotonic_s() - self._due_s > STANDSTILL_S:
             self.note_standstill()
+        if self.port:  # what came while this process was late goes on with what is waiting here
+            self.port.read_arrived()
         requests = self._receiver.take(monotonic_s())
         if requests:  # nobody waits for the answer to a broadcast: one may have another request right behind it
             most = 2 if any(request.unit == BROADCAST_UNIT for request in requests) else 1

@@ -7,9 +7,17 @@ connection; the frames before it stay valid and come out first.
 from struct import Struct
 from typing import Final, NamedTuple
 
+from gateway.modbus.crc import crc16
+
 HEADER: Final = Struct(">HHHB")  # transaction, protocol, length of what follows it, unit
 _SHORTEST_LENGTH: Final = 2  # unit and function
 _LONGEST_LENGTH: Final = 254  # unit and a PDU of 253
+_RTU_BYTES: Final = range(4, 257)  # of a frame on a serial line
+_OTHERS: Final = {
+    b"\x16\x03": "this is TLS: choose Modbus TCP without security in the client, or the port of a TLS face",
+    b"GE": "this is HTTP: the page, where the rig has one, is on a port of its own",
+}
+"""First bytes of what comes to a port of Modbus TCP by mistake, and what to do."""
 
 
 class Adu(NamedTuple):
@@ -49,7 +57,7 @@ class MbapFramer:
         buffer = self._buffer
         if len(buffer) < 6:
             if len(buffer) >= 4 and (buffer[2] or buffer[3]):
-                raise FramingLost(f"protocol id {buffer[2] << 8 | buffer[3]}, Modbus is 0")
+                raise _wrong_protocol(buffer)
             return None
         end = 6 + _check_length(buffer)
         if len(buffer) < end:
@@ -79,10 +87,17 @@ def encode(adu: Adu) -> bytes:
 
 def _check_length(buffer: bytearray) -> int:
     """Bytes after the length field. Raises FramingLost outside 2..254 or when the protocol is another."""
-    protocol = buffer[2] << 8 | buffer[3]
     length = buffer[4] << 8 | buffer[5]
-    if protocol:
-        raise FramingLost(f"protocol id {protocol}, Modbus is 0")
+    if buffer[2] or buffer[3]:
+        raise _wrong_protocol(buffer)
     if not _SHORTEST_LENGTH <= length <= _LONGEST_LENGTH:
         raise FramingLost(f"length {length}, allowed {_SHORTEST_LENGTH} to {_LONGEST_LENGTH}")
     return length
+
+
+def _wrong_protocol(buffer: bytearray) -> FramingLost:
+    """Say what it is instead, where its bytes tell: the wrong one of a client's settings looks like a broken line."""
+    known = _OTHERS.get(bytes(buffer[:2]), "")
+    if not known and len(buffer) in _RTU_BYTES and crc16(bytes(buffer)) == 0:
+        known = "this is Modbus RTU over TCP: choose Modbus TCP in the client or the serial server"
+    return FramingLost(f"protocol id {buffer[2] << 8 | buffer[3]}, Modbus is 0{known and '; '}{known}")

@@ -128,6 +128,11 @@ class SerialPort:
             self._keep(data[sent:])
         return self.is_open
 
+    def read_arrived(self) -> None:
+        """Hand over what has arrived and no turn of the loop has read: one that was late calls its timers first (uvloop)."""
+        if self.is_open:
+            self._on_readable()
+
     def flush_input(self) -> int:
         """Drop what has arrived and was not read yet; how many bytes that was."""
         dropped = 0

@@ -41,7 +41,7 @@ class Mqtt:
     """Figures for an MQTT broker."""
 
     __pydantic_config__ = STRICT
-    host: Annotated[str, MinLen(1)]  # name or address of the broker
+    host: Annotated[str, Field(pattern=r"^([^/:\s]+|[0-9A-Fa-f:.]+)$")]  # name or address of the broker
     port: Annotated[int, Ge(1), Le(65535)] = 1883  # with tls usually 8883
     tls: BrokerTls | None = None  # null: no TLS
     username: Annotated[str, MinLen(1)] | None = None

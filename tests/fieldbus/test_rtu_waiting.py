@@ -1,5 +1,7 @@
 """When the serial face looks at what it has heard, by a loop and a clock of the test's own."""
 
+import asyncio
+import os
 from struct import pack
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +14,9 @@ from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.modbus import Peer, RequestError, RequestFault
 from gateway.modbus import pdu as P  # noqa: N812
 from gateway.modbus.rtu import BROADCAST_UNIT, encode_adu, silence_s
-from gateway.modbus.rtu_receiver import RtuRequest
+from gateway.modbus.rtu_receiver import SPLIT_S, RtuRequest
+from gateway.ports import Pty
+from gateway.ports.port import monotonic_s
 from tests.fieldbus.conftest import NotingBank
 
 LINE = SerialSettings(baud=115200)
@@ -40,8 +44,17 @@ class Scene:
             execute(request)
 
         monkeypatch.setattr(self.server, "_execute", note)
-        write = SimpleNamespace(write=lambda data: self.sent.append((self.now_s, data)), unsent_bytes=0, path="none")
-        monkeypatch.setattr(self.server, "port", write)
+        self.unread = b""
+        port = SimpleNamespace(write=self.write, read_arrived=self.read_arrived, unsent_bytes=0, path="none")
+        monkeypatch.setattr(self.server, "port", port)
+
+    def write(self, data: bytes) -> None:
+        self.sent.append((self.now_s, data))
+
+    def read_arrived(self) -> None:
+        data, self.unread = self.unread, b""
+        if data:
+            self.server._on_bytes(data, self.now_s)
 
     def call_later(self, delay_s: float, callback: Any) -> Any:
         timer = (self.now_s + delay_s, callback)
@@ -94,6 +107,55 @@ def test_who_asked_before_a_standstill_is_not_answered_behind_it(
     assert (len(scene.executed), len(scene.sent)) == (1, answers)
     scene.hear(encode_adu(3, READ))
     assert len(scene.sent) == answers + 1
+
+
+def test_what_came_while_the_process_was_late_is_heard_before_what_waits_for_it_is_given_up(scene: Scene) -> None:
+    """Unit 9 answers with words that are a request to us, an adapter's pause before them: behind a late look at its beginning
+    alone they were a frame of their own, and executed."""
+    words = encode_adu(3, P.write_register_request(1, 777))
+    answer = encode_adu(9, bytes((4, len(words))) + words)
+    scene.server._on_bytes(answer[:3], scene.now_s)
+    scene.run(scene.now_s + 0.01)
+    scene.unread, scene.now_s = answer[3:], scene.now_s + 0.03
+    scene.run(scene.now_s + 0.1)
+    assert (scene.executed, scene.unread) == ([], b"")
+    scene.hear(encode_adu(3, READ))
+    assert len(scene.sent) == 1
+
+
+def test_a_late_turn_of_either_loop_reads_the_port_before_it_judges_the_line(run: Any) -> None:
+    """uvloop calls what is due behind its callbacks without a look at the ports."""
+    words = encode_adu(3, P.write_register_request(1, 777))
+    answer = encode_adu(9, bytes((4, len(words))) + words)
+
+    async def scene() -> None:
+        line, bank, (wake, waker) = Pty(), NotingBank(), os.pipe()
+        server = ModbusRtuServer(
+            bank, RtuSettings(line.path, LINE, 3, Peer("serial:1")), on_peer_closed=print, log=lambda *_: None
+        )
+        await server.start()
+        os.write(line.fd, answer[:3])
+        while server._receiver.deadline_s is None or server._receiver._wait_s < SPLIT_S:
+            await asyncio.sleep(0.001)
+
+        def take_long() -> None:
+            os.read(wake, 1)
+            os.write(line.fd, answer[3:])
+            late_s = monotonic_s() + 2.0 * SPLIT_S
+            while monotonic_s() < late_s:  # this process does not run
+                pass
+
+        asyncio.get_running_loop().add_reader(wake, take_long)
+        os.write(waker, b"1")
+        while server._receiver.frames == 0 and not bank.writes:
+            await asyncio.sleep(0.001)
+        assert (bank.writes, server._receiver.frames) == ([], 1)
+        asyncio.get_running_loop().remove_reader(wake)
+        await server.close()
+        line.close()
+        os.close(wake), os.close(waker)
+
+    run(scene())
 
 
 def test_what_waited_through_a_standstill_is_executed_for_a_stop_may_be_in_it(scene: Scene) -> None:

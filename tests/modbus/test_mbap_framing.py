@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gateway.modbus.mbap import Adu, FramingLost, MbapFramer, encode
+from gateway.modbus.pdu import read_request
+from gateway.modbus.rtu import encode_adu
 
 adus = st.builds(Adu, st.integers(0, 0xFFFF), st.integers(0, 255), st.binary(min_size=1, max_size=253))
 
@@ -75,6 +77,21 @@ def test_a_length_that_no_frame_can_have_loses_the_framing(length: int) -> None:
 def test_another_protocol_loses_the_framing_as_soon_as_it_shows() -> None:
     with pytest.raises(FramingLost, match="protocol id 7"):
         MbapFramer().feed(b"\x00\x01\x00\x07")
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        (bytes.fromhex("16 03 01 02 00 01 00 01 fc"), "this is TLS"),
+        (b"GET / HTTP/1.1\r\n", "this is HTTP"),
+        (encode_adu(1, read_request(3, 100, 10)), "this is Modbus RTU over TCP"),  # as a serial server hands it on
+    ],
+)
+def test_a_client_that_is_set_to_another_protocol_is_told_by_its_bytes(data: bytes, told: str) -> None:
+    with pytest.raises(FramingLost, match=f"Modbus is 0; {told}"):
+        MbapFramer().feed(data)
+    with pytest.raises(FramingLost, match=r"Modbus is 0$"):
+        MbapFramer().feed(b"\x00" + data[1:])
 
 
 def test_frames_before_the_loss_are_not_lost() -> None:

@@ -219,7 +219,7 @@ def _mbpoll(rig: Rig, table: ExchangeTable, called: str) -> Section:
     sentences = ["-r counts from 1: register 1 is address 0."]
     force_n = rig.force_to_try_n
     counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
-    endpoint = f"{f'[{where.host}]' if ':' in where.host else where.host}:{where.shown_port}{where.unit_option}"
+    endpoint = f"{where.shown}{where.unit_option}"
     if network.owner:
         sentences.append(f"Only {network.owner} may command here (network.owner): others read, and disable.")
     if is_no_address(network.owner):

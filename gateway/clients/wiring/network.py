@@ -27,7 +27,7 @@ def network_section(rig: Rig, table: ExchangeTable) -> Section:
     allowed = ", ".join(map(str, network.allow)) or "nobody but this machine"
     upload = "allowed" if network.allow_plain_upload else "refused on plain TCP (W211): allow_plain_upload"
     plain = (
-        ("address", f"{where.host}:{where.shown_port}, TCP"),
+        ("address", f"{where.shown}, TCP"),
         ("unit ids", ", ".join(map(str, network.units))),
         ("may connect", allowed),
         ("upload of models", upload),

@@ -30,7 +30,7 @@ def serial_sections(rig: Rig) -> Iterator[Section]:
         yield _device_section(name, line)
     for place, face in enumerate(rig.fieldbus, start=1):
         if isinstance(face, RtuFace):
-            yield _face_section(place, face, ExchangeTable(rig.register_map, endpoint_of(rig)).status_span)
+            yield _face_section(place, face, ExchangeTable(rig.register_map, endpoint_of(rig)))
         else:
             yield _tls_section(place, face, endpoint_of(rig).unit_option + rig.map_option)
 
@@ -78,7 +78,9 @@ def _address_in_module(device: DeviceProfile, address: int | str) -> int | str:
     )
 
 
-def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section:
+def _face_section(place: int, face: RtuFace, table: ExchangeTable) -> Section:
+    first, words = table.status_span
+    took_s = face.exchange_s(table.command_span[1] + words)
     parity = face.parity if face.port else "none"  # a pseudo-terminal has none
     port = face.port or "a pseudo-terminal, which `run` names when it is ready"
     rows = (
@@ -87,10 +89,13 @@ def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section
         ("line", f"{face.settings}, unit {face.unit}"),
         *(("wires", text) for text in GENERAL[RS485]),
         ("master", "Modbus RTU master of the PLC or robot, 8 data bits, the same settings; one owner per serial face"),
+        (
+            "timing",
+            f"command and status in one FC23: {1e3 * took_s:.0f} ms on the wire, {1.0 / took_s:.0f} a second at most",
+        ),
         *((("role", f"{face.role}: {_ALLOWED[face.role]}"),) if face.role else ()),
     )
     options = f"-m rtu -b {face.baud} -P {parity} -s {face.stop_bits} -a {face.unit}"
-    first, words = status
     commands = (
         f"mbpoll -1 {options} -r {first + 1} -c {words} MASTER-PORT    # on the machine at the other end, with its own port",
     )
@@ -99,16 +104,17 @@ def _face_section(place: int, face: RtuFace, status: tuple[int, int]) -> Section
 
 def _tls_section(place: int, face: TlsFace, options: str) -> Section:
     port = face.port or "a free port, which `run` names when it is ready"
+    host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
+    shown = f"[{host}]" if ":" in host else host
     rows = (
         ("what", "value"),
-        ("address", f"{face.bind}:{port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
+        ("address", f"{shown}:{port}, Modbus/TCP Security (TLS 1.2 or 1.3)"),
         ("may connect", ", ".join(map(str, face.allow)) or "nobody but this machine"),
         ("gateway's files", f"{face.certificate}, {face.key}"),
         ("masters need", f"a certificate signed by {face.ca}, with a role: setpoint to command, calibration to upload"),
         ("not for", "the generated clients, which speak plain Modbus TCP: for masters with TLS of their own"),
     )
-    host = "GATEWAY-ADDRESS" if ip_address(face.bind).is_unspecified else face.bind
-    where = f"{f'[{host}]' if ':' in host else host}:{face.port or 'PORT'}{options}"
+    where = f"{shown}:{face.port or 'PORT'}{options}"
     try_it = (
         f"force-gateway read state --gateway {where} --tls {quote(str(face.ca))} --cert CLIENT.crt --key CLIENT.key"
     )

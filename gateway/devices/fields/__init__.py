@@ -20,7 +20,7 @@ One more shape is not for people: {force:int32} and its like are Modbus register
 
 from typing import Final
 
-from gateway.devices.fields.field import Field, TemplateError, Value, ValueRefused
+from gateway.devices.fields.field import Field, ProfileMisfit, TemplateError, Value, ValueRefused
 from gateway.devices.fields.numbers import Decimals, HexNumber, Plain, Scientific, WholeNumber
 from gateway.devices.fields.registers import RegisterNumber
 from gateway.devices.fields.shapes import field_from
@@ -33,6 +33,7 @@ __all__ = [
     "Field",
     "HexNumber",
     "Plain",
+    "ProfileMisfit",
     "RegisterNumber",
     "Scientific",
     "TemplateError",

@@ -17,6 +17,15 @@ class TemplateError(ValueError):
         self.written = written
 
 
+class ProfileMisfit(ValueError):  # noqa: N818  what it is, as ValueRefused
+    """A key that does not fit the rest of its profile. misfits: the keys that may be meant; a reader of the file tells the line
+    of the first that is there."""
+
+    def __init__(self, misfits: tuple[str, ...], sentence: str) -> None:
+        super().__init__(sentence)
+        self.misfits = misfits
+
+
 class ValueRefused(ValueError):  # noqa: N818 - says what happened, as Refused does
     """A value that this device's grammar cannot carry: nan, inf, too wide, not one of the words, out of range."""
 

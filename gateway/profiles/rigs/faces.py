@@ -14,12 +14,13 @@ from pydantic import AfterValidator, Field, WithJsonSchema
 from gateway import defaults
 from gateway.defaults import STRICT
 from gateway.devices.line_settings import Baud, Parity, SerialSettings
-from gateway.modbus.rtu import LARGEST_UNIT
+from gateway.modbus.rtu import LARGEST_UNIT, silence_s
 from gateway.plain_file import expand_home
 from gateway.profiles.rigs.addresses import Address, Network4Or6
 
 _OF_TLS: Final = ("bind", "certificate", "key", "ca", "allow", "revoked")
 _OF_RTU: Final = ("baud", "parity", "stop_bits", "unit", "role")
+_FC23_BYTES: Final = 18  # beside its words: 13 of the request, 5 of the answer
 
 
 def _rtu_unit(unit: int) -> int:
@@ -58,6 +59,12 @@ class RtuFace:
     def settings(self) -> SerialSettings:
         """The serial line's settings; a character of Modbus RTU has eight bits."""
         return SerialSettings(baud=self.baud, parity=self.parity, stop_bits=self.stop_bits)
+
+    def exchange_s(self, words: int) -> float:
+        """Return how long one FC23 with so many words, written and read together, keeps the line, s: both frames and the
+        silence behind each. What the master and its adapter take comes on top."""
+        character_s = self.settings.character_s
+        return (_FC23_BYTES + 2 * words) * character_s + 2.0 * silence_s(self.baud, character_s)
 
 
 def _serial_number(text: str) -> str:

@@ -35,6 +35,7 @@ _WITH_UNIT: Final = re.compile(rf"({_DECIMAL.pattern}) ?(?P<unit>[^\W\d]\S*)")
 _FORMS: Final = {
     "^[a-z0-9][a-z0-9._-]{0,62}$": "small letters a-z, digits and . _ -, at most 63, a letter or digit first",
     "^/": "an absolute path, with / first",
+    r"^([^/:\s]+|[0-9A-Fa-f:.]+)$": "a name or an address, without mqtt:// and without its port",
     r"^[^/#+\x00]{1,100}$": "1 to 100 characters, none of them / # +",
     r"^[^/#+\x00][^#+\x00]{0,199}$": "1 to 200 characters, none of them # +, and no / first",
 }
@@ -51,6 +52,9 @@ _SWITCHES: Final = dict.fromkeys(("yes", "on", "y", "true"), True) | dict.fromke
 _MOST_KEYS: Final = 6  # of a group, in a sentence
 _ONLY_CHOICE: Final = ", the only choice"
 _SECRETS: Final = ("token", "password", "password_file")  # a password may stand in place of its file
+
+_PATH_OF_A_DEVICE: Final = "the path of a device, such as /dev/serial/by-id/usb-..."
+_TCP_PORT: Final = "the number of a TCP port; a serial line is a face of `type: rtu`"
 
 
 class _Secret(str):
@@ -167,6 +171,8 @@ def _hint(value: Any, what: str, unit: str) -> str:
         return f': write "{number(value)}" in quotes'
     if what == "a list" and isinstance(value, (int, str)) and len(str(value)) <= _SHORT:
         return f": write [{quote_value(value)}]"
+    if what == "text" and isinstance(value, dict):
+        return ": quote a text that begins with `{`"
     if what == "a list" and isinstance(value, dict):
         return ": write `- ` before its first key, and spaces before the others"
     if isinstance(value, _Secret) and what == "text":
@@ -299,13 +305,23 @@ _BY_TYPE: Final[dict[str, Callable[[Any, dict[str, Any], str], str]]] = {
 }
 
 
+def _wanted_port(finding: str, value: Any) -> str:
+    """Return what a port is where a number stands in place of a path, or a path in place of a number; empty otherwise."""
+    if finding == "string_type" and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return _PATH_OF_A_DEVICE
+    return _TCP_PORT if finding == "int_type" and isinstance(value, str) and value.startswith("/") else ""
+
+
 def type_sentence(error: Mapping[str, Any], value: Any, key: object, *, optional: bool = False) -> str:
     """Return the sentence for one pydantic error about a value that is there; value as the file has it. optional: the key may
     be left out."""
     context: dict[str, Any] = error.get("ctx") or {}
     if value is None and error["type"] != "value_error":
-        return "has no value: write one, or leave this line out" if optional else "has no value"
+        comment = "; behind a `#` is a comment: quote a text with it" if error["type"] == "string_type" else ""
+        return ("has no value: write one, or leave this line out" if optional else "has no value") + comment
     if key in _SECRETS and isinstance(value, (str, int, float)) and not isinstance(value, bool):
         value = _Secret(value)
+    if key == "port" and (wanted := _wanted_port(error["type"], value)):
+        return f"{quote_value(value)} is not {wanted}"
     words = _BY_TYPE.get(error["type"])
     return words(value, context, unit_of(key)) if words else f"{quote_value(value)}: {error['msg']}"

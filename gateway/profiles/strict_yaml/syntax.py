@@ -21,6 +21,8 @@ class _Meaning(NamedTuple):
     is_where_opened: bool = False
 
 
+_BLOCK: Final = "`>` and `|` begin text on the lines below them: quote the text that begins so"
+_TAG: Final = "tags (`!...`) are not used here; quote the text"
 _TOO_DEEP: Final = "nested deeper than any profile"
 _MEANINGS: Final = tuple(
     _Meaning(*row)
@@ -41,10 +43,15 @@ _MEANINGS: Final = tuple(
         ),
         ("sequence entries are not allowed", "a list item `- ` cannot stand here: begin it on a line of its own"),
         ("unknown escape character", "an unknown `\\` escape within double quotes: use single quotes"),
-        ("undefined tag handle", "tags (`!...`) are not used here; quote the text"),
+        ("undefined tag handle", _TAG),
         ("control characters are not allowed", "a control character that no text editor shows: delete it"),
         ("special characters are not allowed", "a control character that no text editor shows: delete it"),
         ("expected alphabetic", "`*` and `&` name a value of YAML: quote the text that begins so", True),
+        ("comment or line break", _BLOCK, True),
+        ("comment or a line break", _BLOCK, True),
+        ("indentation indicator", _BLOCK, True),
+        ("expected whitespace or line break", _TAG, True),
+        ("expected ' ', but found", _TAG, True),
         ("that cannot start any token", "a value cannot begin with this character: quote the text"),
         ("<document start>", "nothing can follow here: check the spaces before the keys"),
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from functools import cache
 from types import UnionType
-from typing import Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -104,9 +104,15 @@ def _fault(kind: type, document: Document, path: Path, place: Path, finding: Map
         elsewhere |= getattr(holder, "KEPT_ELSEWHERE", {})
         sentence, suggestion = unknown_key(str(key), document.at(*place[:-1]), known, elsewhere)
         return replace(document.fault(place, sentence, at_key=True), kind=FaultKind.STRANGER, meant=suggestion)
-    if written := getattr((finding.get("ctx") or {}).get("error"), "written", ""):
+    error = (finding.get("ctx") or {}).get("error")
+    if written := getattr(error, "written", ""):
         place = _place_of(written, document, place)
-    return document.fault(place, _sentence(kind, document, path, place, finding))
+    fault = document.fault(place, _sentence(kind, document, path, place, finding))
+    there = (key for key in getattr(error, "misfits", ()) if (*place, key) in document.marks)
+    if misfit := next(there, ""):  # its sentence names the key: the line alone is told
+        mark = document.marks[(*place, misfit)]
+        fault = replace(fault, line=mark.key_line, column=mark.key_column)
+    return fault
 
 
 def _place_of(text: str, document: Document, group: Path) -> Path:
@@ -162,10 +168,10 @@ def _finding_with(kind: type, document: Document, path: Path, place: Path, value
 
 
 def _types(kind: type, path: Path) -> list[str]:
-    """Return the words that the `type` of a group of several kinds may be."""
+    """Return the words that the `type` of a group of several kinds may be; `kind` itself may be several, at no path."""
     steps = [step for step in path if isinstance(step, str)]
     holder = kind_at(kind, tuple(steps[:-1]))
-    kinds = [inner for name, inner in groups(holder) if name == steps[-1]] if holder and steps else []
+    kinds = [inner for name, inner in groups(holder) if name == steps[-1]] if holder and steps else _kinds(kind)
     return [word for inner in kinds for word in get_args(get_type_hints(inner).get("type"))]
 
 
@@ -236,8 +242,17 @@ def groups(kind: type) -> tuple[tuple[str, type], ...]:
     )
 
 
+def _kinds(hint: Any) -> list[type]:
+    """Return the dataclasses of a union of several."""
+    return (
+        [one for one in _members(hint) if is_dataclass(one) and isinstance(one, type)] if not is_dataclass(hint) else []
+    )
+
+
 def _members(hint: Any) -> Iterator[Any]:
-    if get_origin(hint) in (Union, UnionType, tuple):
+    if get_origin(hint) is Annotated:
+        yield from _members(get_args(hint)[0])
+    elif get_origin(hint) in (Union, UnionType, tuple):
         for member in get_args(hint):
             yield from _members(member)
     else:

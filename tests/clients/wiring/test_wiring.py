@@ -67,7 +67,8 @@ def test_the_page_of_a_rig_of_one_s_own_has_its_own_numbers(own_rig: Path) -> No
     assert rows_of(page, "Siemens S7-1200/1500: connection of MB_CLIENT")["RemoteAddress"][0].endswith("10, 1, 2, 3")
     assert rows_of(page, "ABB IRC5: RAPID sockets")["FG_HOST, FG_PORT, FG_UNIT"] == ['"10.1.2.3", 502, 1']
     face = rows_of(page, "Serial face 1: Modbus RTU, masters ask here")
-    assert face["line"] == ["38400 8E1, unit 17"]
+    timing = "command and status in one FC23: 34 ms on the wire, 29 a second at most"
+    assert (face["line"], face["timing"]) == (["38400 8E1, unit 17"], [timing])
     text = call("wiring", str(own_rig))
     assert "mbpoll -1 -m rtu -b 38400 -P even -s 1 -a 17 -r 101 -c 32 MASTER-PORT" in text
     assert "asks port 502 always" not in text
@@ -90,6 +91,16 @@ def test_a_face_with_certificates_is_told_from_what_the_clients_speak() -> None:
     far = replace(rig, fieldbus=(replace(face, bind="fd00::5"),))
     (line,) = next(each.commands for each in wiring_page(far, "demo")[1] if each.title == "Face 1: Modbus/TCP Security")
     assert " --gateway [fd00::5]:802 " in line
+
+
+@pytest.mark.parametrize(("bind", "told"), [("0.0.0.0", "GATEWAY-ADDRESS:802,"), ("fd00::5", "[fd00::5]:802,")])
+def test_an_address_of_the_page_is_one_to_connect_to(bind: str, told: str) -> None:
+    """A face of every address was told as 0.0.0.0, one of IPv6 without brackets; the command below it had it right."""
+    face = TlsFace(type="tls", port=802, certificate="gateway.crt", key="gateway.key", ca="ca.crt", bind=bind)
+    rig = load_rig("demo")
+    rig = replace(rig, fieldbus=(face,), network=replace(rig.network, bind=bind, port=802))
+    shown = [row[1] for each in wiring_page(rig, "demo")[1] for row in each.rows if row[0] == "address"]
+    assert [one.partition(" ")[0] for one in shown] == [told, told]
 
 
 def test_a_rig_that_answers_another_unit_only_is_asked_as_that_by_every_line(tmp_path: Path) -> None:

@@ -126,6 +126,41 @@ def test_a_stream_has_a_pace_and_no_question(new: str, sentence: str) -> None:
     assert sentence in fault
 
 
+REGISTERS = (
+    "codec: modbus-rtu\nread_force: {modbus: {function: 3, first: 0, last: 0, weight: 0}, unit: N, rate_hz: 9}\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ("  rate_hz: 10", "  rate_hz: 0", "stream:", "rate_hz of stream is missing"),
+        ("stream:", "read_force:", "read_force:", "read_force needs an ask"),
+        ("stream:", "codec: modbus-rtu\nstream:", "stream:", "stream of codec modbus-rtu needs `modbus`"),
+        (
+            STREAM[STREAM.index("stream:") :],
+            REGISTERS,
+            "terminator:",
+            "a frame of Modbus RTU or of raw bytes has its own",
+        ),
+        (
+            "stream:",
+            "steps: [{ask: A, by: 1}]\nstream:",
+            "steps:",
+            "set_voltage, read_voltage, read_pressure and steps",
+        ),
+    ],
+)
+def test_what_does_not_fit_the_rest_of_a_profile_is_told_at_its_line(
+    old: str, new: str, line: str, sentence: str
+) -> None:
+    """Each of these was told at 1:1, in a file of sixty lines, too."""
+    (fault,) = told((old, new), source=STREAM)
+    place, _, said = fault.partition(": ")
+    here = STREAM.replace(old, new).splitlines()[int(place.split(":")[0]) - 1]
+    assert (here[: len(line)], said[: len(sentence)]) == (line, sentence)
+
+
 RELAY = r"""name: my-relay
 description: relay
 role: valve

@@ -168,6 +168,28 @@ def test_a_real_rig_needs_its_two_ports_and_two_different_ones(tmp_path: Path) -
     assert named == ['output.port: "ttyUSB0" is not the path of a device, such as /dev/serial/by-id/usb-...']
 
 
+@pytest.mark.parametrize(
+    ("port", "told"),
+    [
+        ("3", "3 is not the path of a device, such as /dev/serial/by-id/usb-..."),  # not: write "3" in quotes
+        ("/dev", "/dev is a directory and no serial port: `force-gateway ports` lists what is plugged in"),
+        ("/etc/passwd", "/etc/passwd is a file and no serial port: `force-gateway ports` lists what is plugged in"),
+    ],
+)
+def test_a_port_that_can_be_none_is_told_by_what_a_port_is(port: str, told: str, tmp_path: Path) -> None:
+    line = next(line for line in CELL.splitlines() if line.startswith("  port: /dev/"))
+    assert messages(report(tmp_path, CELL, (line, f"  port: {port}")).faults) == [f"output.port: {told}"]
+    serial = f"fieldbus: [{{type: rtu, port: {port}}}]\naccept_no"
+    faults = messages(report(tmp_path, CELL, ("accept_no", serial)).faults)
+    assert faults == [f"fieldbus[0].port: {told}"]
+
+
+def test_a_serial_port_in_place_of_a_tcp_port_is_told_where_it_belongs(tmp_path: Path) -> None:
+    (told,) = messages(report(tmp_path, CELL, ("  port: 5020", "  port: /dev/ttyS0")).faults)
+    wanted = "the number of a TCP port; a serial line is a face of `type: rtu`"
+    assert told == f'network.port: "/dev/ttyS0" is not {wanted}'
+
+
 @pytest.mark.parametrize("port", ["192.168.1.127:502", "socket://moxa:4001", "10.0.0.5", "nport.cell:950"])
 def test_a_device_that_has_ethernet_is_told_what_it_needs(port: str, tmp_path: Path) -> None:
     line = next(line for line in CELL.splitlines() if line.startswith("  port: /dev/"))

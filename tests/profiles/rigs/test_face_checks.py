@@ -4,7 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from gateway.modbus.pdu import read_write_request
+from gateway.modbus.rtu import encode_adu
 from gateway.profiles import Report, check_report, load_rig
+from gateway.profiles.rigs.faces import RtuFace
 from tests.certificates import store_all
 from tests.profiles.rigs.test_checks import messages
 from tests.profiles.rigs.test_tls_checks import files
@@ -46,6 +49,7 @@ def test_a_face_is_read_with_modbus_own_defaults(tmp_path: Path) -> None:
         ),
         ("[{type: rtux, port: /dev/ttyS9}]", "fieldbus[0]: type rtux is not one of rtu, tls; did you mean rtu?"),
         ("[{type: null, port: /dev/ttyS9}]", "fieldbus[0]: has no type"),
+        ("[{port: /dev/ttyS9}]", "fieldbus[0]: has no type: it says what this is, one of rtu, tls"),
         (
             "[{type: rtu, port: /dev/ttyS9, ca: a}]",
             "fieldbus[0].ca: is not a known key here; it belongs to a face of `type: tls`",
@@ -84,6 +88,27 @@ def test_a_rig_needs_some_face(tmp_path: Path) -> None:
 def test_a_port_that_may_change_its_name_is_a_warning(tmp_path: Path) -> None:
     warnings = messages(report(tmp_path, "[{type: rtu, port: /dev/ttyUSB0}]").warnings)
     assert any(told.startswith("fieldbus[0].port: /dev/ttyUSB0 may be another adapter") for told in warnings)
+
+
+@pytest.mark.parametrize(
+    ("face", "told"),
+    [
+        ("baud: 4800", "0.26 s on the wire at 4800 baud: a master that exchanges them loses its lease of 0.2 s (A310)"),
+        ("baud: 9600", ""),
+        ("baud: 4800, role: monitor", ""),  # reads only, and holds no lease
+    ],
+)
+def test_a_face_that_is_slower_than_the_lease_is_a_warning(tmp_path: Path, face: str, told: str) -> None:
+    """At 2400 baud `hold` lost its force within a second, and check had said nothing."""
+    found = report(tmp_path, f"[{GOOD.removesuffix('}')}, {face}}}]")
+    warnings = [one for one in messages(found.warnings) if one.startswith("fieldbus[0].baud")]
+    assert warnings == ([f"fieldbus[0].baud: command and status take {told}"] if told else [])
+    assert found.rig is not None
+    (served,) = found.rig.fieldbus
+    assert isinstance(served, RtuFace)
+    asked = encode_adu(1, read_write_request(100, 32, 0, bytes(26)))
+    bits = (len(asked) + len(encode_adu(1, bytes(2 + 64)))) * 11
+    assert served.exchange_s(13 + 32) == pytest.approx(bits / served.baud + 2 * 3.5 * 11 / served.baud)
 
 
 def test_a_simulated_run_takes_no_port_of_the_cell_and_says_so(tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ def test_a_word_means_what_yaml_1_2_says(parse: Parse, written: str, meant: obje
     assert value == meant and type(value) is type(meant)
 
 
+BLOCK = "`>` and `|` begin text on the lines below them: quote the text that begins so"
 BEHIND_A_BRACE = "nothing but a comma stands behind `}`: quote the whole of a text that has braces in it"
 
 
@@ -102,6 +103,8 @@ BEHIND_A_BRACE = "nothing but a comma stands behind `}`: quote the whole of a te
         (b"a: {b: *{c:d}}\n", "rig.yaml:1:8: `*` and `&` name a value of YAML: quote the text that begins so"),
         (b"a: &\n", "rig.yaml:1:4: `*` and `&` name a value of YAML: quote the text that begins so"),
         (b"a: @x\n", "rig.yaml:1:4: a value cannot begin with this character: quote the text"),
+        *((f"a: {begun}V{{v:d}}\n".encode(), f"rig.yaml:1:4: {BLOCK}") for begun in (">", "|", ">+0", "|-")),
+        (b"a: !V{v:d}\n", "rig.yaml:1:4: tags (`!...`) are not used here; quote the text"),
         (b"a: !!python/object:os.system x\n",
          "rig.yaml:1:4 a: tag `tag:yaml.org,2002:python/object:os.system`: tags are not used here; quote the text"),
         (b"a: !\n", "rig.yaml:1:4 a: tag `!`: tags are not used here; quote the text"),

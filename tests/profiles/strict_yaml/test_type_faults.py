@@ -93,7 +93,8 @@ def test_an_unknown_key_is_placed_at_the_key_with_what_was_meant(old: str, new: 
         ("simulated: true", "simulated: off", 'simulated: "off" is not true or false: write false'),
         ("simulated: true", "simulated: 1", "simulated: 1 is not true or false"),
         ("name: demo", "name: 12", 'name: 12 is not text: write "12" in quotes'),
-        ("name: demo", "name: null", "name: has no value"),
+        ("name: demo", "name: #12", "name: has no value; behind a `#` is a comment: quote a text with it"),
+        ("name: demo", "name: {v: 1}", "name: a group of keys is not text: quote a text that begins with `{`"),
         ("lease_s: null", "lease_action: falt",
          "supervision.lease_action: falt is not one of fault, hold, ramp; did you mean fault?"),
         ("sign: 1", "unit: kN", "load_cell.unit: kN is not one of N, kg, g, lb; in its place: newton_per_count: 1000"),
@@ -187,6 +188,18 @@ def test_no_quotes_or_brackets_are_proposed_where_they_are_refused(new: str, sen
     """`bind: true` was told to go in quotes, and `allow: 24` in brackets."""
     (fault,) = told(("bind: 127.0.0.1", new))
     assert fault.split(" ", 1)[1] == sentence
+
+
+@pytest.mark.parametrize("host", ["broker.cell-3.local", "10.0.0.5", "fd00::5", "::1"])
+def test_a_broker_is_a_name_or_an_address(host: str) -> None:
+    assert told(("registers: force-v1", f'mqtt: {{host: "{host}"}}\nregisters: force-v1')) == []
+
+
+@pytest.mark.parametrize("host", ["mqtt://broker", "broker:1883", "my broker"])
+def test_a_broker_with_more_than_its_name_is_refused(host: str) -> None:
+    (fault,) = told(("registers: force-v1", f'mqtt: {{host: "{host}"}}\nregisters: force-v1'))
+    form = "a name or an address, without mqtt:// and without its port"
+    assert fault.endswith(f' mqtt.host: "{host}" does not have the form: {form}')
 
 
 def test_of_a_hostile_document_no_proposal_is_tried() -> None:

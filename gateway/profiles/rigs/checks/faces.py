@@ -8,6 +8,8 @@ from gateway.profiles.rigs.addresses import is_certificate
 from gateway.profiles.rigs.checks.lines import NO_PORT, UNSTABLE, UNSTABLE_PATHS, lines_of, why_no_path
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.faces import RtuFace, TlsFace
+from gateway.profiles.strict_yaml.fault_sentences import second
+from gateway.registers.map.register_map import span_of
 from gateway.registers.writes.ownership import LARGEST_SERIAL_PLACE, serial_place
 
 
@@ -98,8 +100,21 @@ def check_face_ports_stable(parts: Parts) -> Found:
             yield f"{path}.port", f"{face.port} {UNSTABLE}"
 
 
+def check_faces_carry_the_lease(parts: Parts) -> Found:
+    """Yield a warning for a serial face that is slower than the lease: whoever commands there loses the force at work."""
+    lease_s = parts.supervision.lease_s if parts.supervision else None
+    if lease_s is None or parts.register_map is None:
+        return
+    words = sum(span_of(parts.register_map.registers_of(block))[1] for block in ("command", "status"))
+    for path, face in _rtu_faces(parts):
+        took_s = face.exchange_s(words)
+        if face.role != "monitor" and took_s > lease_s:
+            slow = f"command and status take {second(round(took_s, 2))} on the wire at {face.baud} baud"
+            yield f"{path}.baud", f"{slow}: a master that exchanges them loses its lease of {second(lease_s)} (A310)"
+
+
 HARDWARE: Final[tuple[Check, ...]] = (check_face_ports_given, check_face_ports_differ)
 """Faults that a run with simulated devices does not mind: its serial faces are pseudo-terminals."""
 
 FAULTS: Final[tuple[Check, ...]] = (check_any_face, check_serial_places, check_serial_owner, check_owner_can_come)
-WARNINGS: Final[tuple[Check, ...]] = (check_face_ports_stable,)
+WARNINGS: Final[tuple[Check, ...]] = (check_face_ports_stable, check_faces_carry_the_lease)

@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Final
 
 from gateway.devices import DeviceProfile, DeviceRole, cell_host
@@ -67,7 +68,8 @@ def why_no_path(port: str) -> str:
         cure = "put your adapter's path here, `force-gateway ports` lists them"
         return f"{port} is a placeholder: {cure}"
     if port.startswith("/"):
-        return ""
+        other = "a directory" if Path(port).is_dir() else "a file" if Path(port).is_file() else ""
+        return f"{port} is {other} and no serial port: `force-gateway ports` lists what is plugged in" if other else ""
     wanted = f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
     cure = "a device is on a serial line, and what has Ethernet needs a serial server whose driver makes a port here"
     return f"{wanted}: {cure}" if _HOST.search(port) else wanted
