@@ -149,6 +149,9 @@ REGISTERS = (
             "steps:",
             "set_voltage, read_voltage, read_pressure and steps",
         ),
+        ('terminator: "\\r\\n"\n', "", "stream:", "terminator is missing"),
+        ('terminator: "\\r\\n"\n', 'terminator: ""\n', "terminator:", "terminator is missing"),
+        ('terminator: "\\r\\n"\n', 'terminator: "é"\n', "terminator:", "terminator and question_terminator are ASCII"),
     ],
 )
 def test_what_does_not_fit_the_rest_of_a_profile_is_told_at_its_line(

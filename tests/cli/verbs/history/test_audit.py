@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.write_series import WriteSeries
 from gateway.cli.verbs.history.audit import format_record
 from tests.audit.appending import append
@@ -46,6 +46,17 @@ def numbers(output: str) -> list[int]:
 def test_only_who_and_what_was_asked_for_is_shown(state: Path, call, words: tuple[str, ...], shown: list[int]) -> None:
     answer = call("audit", "show", "--json", *words, "--state", state)
     assert answer.exit_code == 0 and numbers(answer.output) == shown
+
+
+@pytest.mark.parametrize(("altered", "held"), [(1, "nothing holds"), (2, "1 line holds"), (3, "2 lines hold")])
+def test_how_many_lines_hold_is_told_in_the_right_number(state: Path, call, altered: int, held: str) -> None:
+    """E170 said that "the 1 lines before it hold"."""
+    (path,) = audit_files(state / "audit")
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert call("audit", "verify", "--state", state).stdout.startswith("3 lines hold, ")
+    lines[altered - 1] = lines[altered - 1].replace(b'"what"', b'"whet"')
+    path.write_bytes(b"".join(lines))
+    assert call("audit", "verify", "--state", state).stderr.endswith(f"; before it {held}\n")
 
 
 def test_behind_a_clock_that_was_set_back_it_is_read_on(state: Path, call) -> None:
