@@ -57,18 +57,18 @@ def verify_command(*, as_json: bool, state: StateChoice) -> None:
         verdict = verify_audit(state.directory)
     except FileNotFoundError:
         raise _no_audit(state) from None
+    held = "1 line holds" if verdict.lines == 1 else f"{verdict.lines} lines hold"
     if as_json:
         broken = verdict.broken._asdict() if verdict.broken else None
         facts = {"lines": verdict.lines, "last": verdict.end._asdict(), "broken": broken, "notes": verdict.notes}
         click.echo(json.dumps(facts, indent=2))
     elif not verdict.broken:
-        click.echo(f"{verdict.lines} lines hold, up to line {verdict.end.number}, sha256 {verdict.end.sha256}")
+        click.echo(f"{held}, up to line {verdict.end.number}, sha256 {verdict.end.sha256}")
     for note in () if as_json else verdict.notes:
         click.echo(note)
     if verdict.broken:
         where = f"{verdict.broken.file} line {verdict.broken.line}" if verdict.broken.line else verdict.broken.file
-        held = f"the {verdict.lines} lines before it hold" if verdict.lines else "nothing before it holds"
-        raise CliError(f"E170 {where} {verdict.broken.text}; {held}")
+        raise CliError(f"E170 {where} {verdict.broken.text}; before it {held if verdict.lines else 'nothing holds'}")
 
 
 def format_record(record: dict[str, Any]) -> str:
