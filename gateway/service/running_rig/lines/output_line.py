@@ -5,14 +5,10 @@ wire an ever older past. Setpoints go before polls; polls fill the idle wire and
 the pressure where the device measures it, else the setting that stands (both in turn where a setting is answered without its
 number), else, of a device that cannot be asked anything, the same setting once more. Time comes in as an argument.
 
-An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
-it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
-an honest device would look like one that alters its settings. So after a time-out an answer that repeats a setting which was
-given up answers that one, and what was asked last is still out. One that repeats neither is believed by nobody: the line is
-left alone for one reply time, then asked anew. A falling voltage never waits. After any of them the setting is read or sent
-anew: the device may have lost its power, and stand where it then begins. What a line that stands still has not sent of a
-given-up question is dropped: no older voltage goes out before the safe one. An answer that comes twice has the same effect:
-where an echo repeats the setting before, the line is left alone as well.
+What is done about an answer that comes late, or garbled, given_up_questions tells. Behind one the setting is read or sent anew:
+the device may have lost its power, and stand where it then begins. What a line that stands still has not sent of a given-up
+question is dropped: no older voltage goes out before the safe one. An answer that comes twice has the same effect: where an
+echo repeats the setting before, the line is left alone as well.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
 sentence that nobody answers. A device whose watchdog has tripped obeys no setting until it is cleared; it is told the safe
@@ -65,7 +61,8 @@ class OutputExchange:
 
     acknowledged_v: confirmed by the device, None before the first; standing_v: surely stands there, None while another one is
     on its way, and where nobody knows; unanswered_since_s: send time of the oldest question without an answer;
-    answer_late_s: what the last answer took, where it came after its time, else 0; fault: three failures in a row, or what the
+    answer_late_s: what the last answer took, where it came after its time, else 0; round_trip_s: what the last one took that
+    is surely the question's own, nan before the first; fault: three failures in a row, or what the
     device's checks have found; pressure_pa: last measured, nan before the first; counts: since the start, whatever reset in
     between. checks: the questions about the device itself, made from the host where none are given.
     """
@@ -98,7 +95,7 @@ class OutputExchange:
         self._sent_v = self._setting_s = self.pressure_pa = nan
         self.standing_v: float | None = None
         self._given_up.forget()
-        self._is_overdue = self._is_behind = False  # a question was given up; its answer came, that to the last is out
+        self._is_behind = False  # the answer to one that was given up came, that to the last is out
         self._patience_s = self._reply_timeout_s  # shorter where garbage came: behind a round trip that was the answer
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
@@ -166,7 +163,8 @@ class OutputExchange:
         if isinstance(question, AskDevice):
             self.checks.miss(question.step)
         self._given_up.note(question, self._sent_s)
-        self._in_flight, self._is_overdue = None, True
+        self._given_up.is_overdue = True
+        self._in_flight = None
 
     def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
@@ -186,7 +184,6 @@ class OutputExchange:
             self._refused_v = nan
             self._send(AskDevice(step), now_s)
         elif not (self._is_confirmed(wanted_v) or self._gives_way(wanted_v, now_s)) and self._may_obey(wanted_v, now_s):
-            self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
                 self._before_v = self._asked_v
             self._asked_v, self.standing_v = wanted_v, None
@@ -235,10 +232,10 @@ class OutputExchange:
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.counts.garbled += 1
-            self._patience_s = min(self._reply_timeout_s, self.round_trip_s)
+            self._patience_s = self._given_up.patience_s(self.round_trip_s)
             self._unread = explain_answer(reply.data, self._frame)
             if self._in_flight is None:  # unasked: that was it
-                self._is_overdue = False
+                self._given_up.is_overdue = False
                 del self._given_up.questions[:1]
             return
         request, self._in_flight = self._in_flight, None
@@ -250,14 +247,16 @@ class OutputExchange:
             self.checks.begin()
             self.standing_v = None  # a watchdog has put out its own, say: what is read back was commanded before
         self.unanswered_since_s, self._unread = None, ""
-        if self._is_overdue and not self._is_echo(request, reply):
+        is_doubtful = self._given_up.is_overdue or now_s < self._quiet_until_s
+        if is_doubtful and not self._is_echo(request, reply):
             self._given_up.note_strange(now_s)
             if request is not None:
                 self._given_up.note(request, self._sent_s)  # if what came was of an older one
-            self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
+            self._given_up.is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
             return
+        self.round_trip_s = self.round_trip_s if self._given_up.is_awaited else now_s - self._sent_s
         self._given_up.questions.clear()
-        self.answer_late_s, self.round_trip_s = 0.0, now_s - self._sent_s
+        self.answer_late_s = 0.0
         if isinstance(request, AskDevice):
             self._take_check(request, reply)
         elif isinstance(reply, WatchdogTripped):
