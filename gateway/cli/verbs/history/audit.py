@@ -49,8 +49,9 @@ def show_command(*, after: str, peer: str | None, as_json: bool, state: StateCho
 def verify_command(*, as_json: bool, state: StateChoice) -> None:
     """Follow the chain of hashes; exit code 1 at its first break.
 
-    A changed byte, and a line removed, added or moved are found; an incomplete last line, as a power cut leaves it, is
-    told apart. Who may write the directory can write a whole new chain: keep the last hash elsewhere where that matters.
+    A changed byte, and a line removed, added or moved are found; what a power cut leaves behind the last line that was
+    on the disk for certain (audit/head names it) is told apart. Who may write the directory can write a whole new
+    chain: keep the last hash elsewhere where that matters.
     """
     _directory_of(state)
     try:
