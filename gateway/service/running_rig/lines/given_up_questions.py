@@ -63,7 +63,7 @@ class GivenUpQuestions:
 
     def note_strange(self, now_s: float) -> None:
         """Note an answer of which nobody knows whose it is: none that was asked before counts as silent any more."""
-        self._heard_s = now_s
+        self._heard_s, self.is_overdue = now_s, False
 
     def take_answer(self, is_its: Callable[[OutputRequest], bool], now_s: float) -> float | None:
         """Return when the first one was sent whose answer this may be, None where there is none. Those before it will never be

@@ -264,7 +264,8 @@ class OutputExchange:
             self._given_up.note_strange(now_s)
             if request is not None:
                 self._given_up.note(request, self._sent_s)  # if what came was of an older one
-            self._given_up.is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
+            # one reply time: else what is not its echo, a refusal of each fall, is doubted for as long as it falls
+            self._quiet_until_s = self._quiet_until_s if now_s < self._quiet_until_s else now_s + self._reply_timeout_s
             return
         self._given_up.note_answer(now_s - self._sent_s)
         self.answer_late_s = 0.0

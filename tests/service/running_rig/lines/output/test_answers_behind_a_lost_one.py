@@ -10,6 +10,7 @@ from gateway.devices.messages import (
     Pressure,
     ReadPressure,
     ReadVoltage,
+    Refused,
     SetVoltage,
 )
 from gateway.service.running_rig.lines.output_line import OutputExchange
@@ -64,7 +65,7 @@ class FallingLine:
         profile = load_device("icpdas-702x")
         self.device, self.written = output_device(profile), list[bytes]()
         self.exchange = OutputExchange(output_host(profile), self.written.append, REPLY_TIMEOUT_S)
-        self.now_s, self.stands_v, self.is_lost = 100.0, 0.0, False
+        self.now_s, self.stands_v, self.is_lost, self.is_refusing = 100.0, 0.0, False, False
 
     def run(self, seconds: float, begin_v: float, step_v: float) -> None:
         turns, until_s = 0, self.now_s + seconds
@@ -78,8 +79,9 @@ class FallingLine:
                 said = (
                     DeviceAnswer(asked.step, is_right=True) if isinstance(asked, AskDevice) else Accepted(self.stands_v)
                 )
+                refused = Refused("?01") if self.is_refusing and isinstance(asked, SetVoltage) else said
                 if not self.is_lost:
-                    self.exchange.on_bytes(self.device.reply(said, to=asked), self.now_s)
+                    self.exchange.on_bytes(self.device.reply(refused, to=asked), self.now_s)
                 self.is_lost = False
             self.exchange.set_voltage(max(0.1, begin_v - step_v * (turns // 6)), self.now_s)
             self.exchange.tick(self.now_s)
@@ -96,3 +98,12 @@ def test_while_the_voltage_falls_a_lost_answer_leaves_no_doubt_of_all_that_come_
     line.run(2.0, 9.0, 0.1)
     assert line.exchange.checks.times_forgotten == 1 and line.exchange.checks.is_armed
     assert line.exchange.fault is FaultCode.NONE and line.stands_v > 0.0
+
+
+def test_a_device_that_refuses_each_fall_behind_a_lost_answer_is_found() -> None:
+    """Each refusal came in the quiet time behind the one before, which it prolonged: while it fell none was believed."""
+    line = FallingLine()
+    line.run(0.5, 9.0, 0.0)
+    line.is_lost = line.is_refusing = True
+    line.run(0.5, 9.0, 0.1)
+    assert line.exchange.fault is FaultCode.OUTPUT_REFUSED
