@@ -50,7 +50,7 @@ class KnownLease:
 class HeartbeatThread(threading.Thread):
     """Runs a HoldRun against a gateway until it ends. `status` is the newest one read; `failure` what went wrong, if anything.
 
-    lease: None where nobody has said what the rig's is. ends_s: when it lets go by itself, by the clock.
+    lease: None where nobody has said what the rig's is. lasts_s: how long behind its enable it lets go by itself.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class HeartbeatThread(threading.Thread):
         self.failure: Exception | None = None
         self.stopping = SignalFlag()
         self.dropping = SignalFlag()
-        self.ends_s = inf
+        self.lasts_s = inf
         self._pause = threading.Event()  # nobody ends it
         self._client = client
         self._lease = lease
@@ -80,11 +80,14 @@ class HeartbeatThread(threading.Thread):
         """Look, then beat until the hold has ended or the gateway is gone."""
         try:
             self._look()
+            enabled_s: float | None = None
             while self.hold.end is None:
                 began_s = self._clock()
-                if began_s >= self.ends_s:
+                if enabled_s is not None and began_s - enabled_s >= self.lasts_s:
                     self.stopping.set()
                 self._step(began_s)
+                if enabled_s is None and self.hold.is_pressing:
+                    enabled_s = began_s
                 if self.hold.end is None:
                     self._wait(self._period_s - (self._clock() - began_s))
             self._look()

@@ -24,9 +24,11 @@ from gateway.registers.words import State, StatusBit
 PRESSING = StatusReading(State.HOLDING, applied_n=12.0)
 
 
-def test_it_lets_go_by_itself_when_its_time_is_over(fake: Any, call: Any) -> None:
+@pytest.mark.parametrize("time", ["50ms", "0.001ms"])
+def test_it_lets_go_by_itself_when_its_time_is_over(time: str, fake: Any, call: Any) -> None:
+    """Its time begins with its enable: what a busy machine takes until then made a short hold none at all."""
     fake.bank.set("state", State.HOLDING)
-    done = call("hold", "12", "--for", "50ms", "--json", "--gateway", fake.address)
+    done = call("hold", "12", "--for", time, "--json", "--gateway", fake.address)
     assert done.exit_code == 0, done.output
     assert json.loads(done.output.splitlines()[-1]) == {"end": "stopped"}
     assert fake.bank.writes[0][1][:2] == (1, 1200) and fake.bank.writes[-1][1][:2] == (0, 0)

@@ -135,7 +135,7 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
     from gateway.cli.force_hold.state_line import StateLine
 
     state_line, began_s = StateLine(as_json=as_json), time.monotonic()
-    beat.ends_s = inf if for_s is None else began_s + for_s
+    beat.lasts_s = inf if for_s is None else for_s
     with _handle_signals(beat):
         beat.start()
         try:
