@@ -27,6 +27,7 @@ def places(rng: random.Random, x0: float, x1: float) -> list[float]:
     return [x0 + (x1 - x0) * share for share in shares]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("spread", [0.0, 1.0, 6.0])
 @pytest.mark.parametrize("order", ORDERS)
 def test_value_and_slope_agree_with_fifty_digits(order, spread, reference):
@@ -62,6 +63,7 @@ def test_a_range_that_ends_at_zero_volts_keeps_relative_accuracy_there(order, re
         force -= 1e-9
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("weight", [1e-12, 1e-6, 1e6, 1e12])
 @pytest.mark.parametrize("order", [2, 3, 5, 15])
 def test_weights_that_are_nearly_a_pole_or_nearly_absent_stay_exact(order, weight, reference):

@@ -42,6 +42,7 @@ def forces(handles: Sequence[float]) -> list[float]:
     return [low + share * (high - low) for share in SHARES]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scale", [1.0, 1e-156, 1e-90, 1e90, 1e156, 1e199], ids=lambda scale: f"x{scale:g}")
 @pytest.mark.parametrize("name", CURVES)
 def test_the_force_of_the_inverse_is_the_one_that_was_asked_for(name: str, scale: float) -> None:

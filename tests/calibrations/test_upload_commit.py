@@ -58,6 +58,7 @@ def test_what_an_upload_does_not_tell_is_not_made_up(bench):
     assert len(stored.data_sha256) == 64
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", range(1, 16))
 def test_every_order_is_carried_and_starts_again_after_a_restart(bench, order):
     rng = Random(order)
@@ -155,6 +156,7 @@ CHECKS = [
 ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("action", [COMMIT, DRY_RUN])
 @pytest.mark.parametrize(("words", "index", "reason"), CHECKS, ids=lambda value: getattr(value, "name", ""))
 def test_a_set_that_fails_a_check_changes_nothing_and_says_where_and_why(bench, words, index, reason, action):

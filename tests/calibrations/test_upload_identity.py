@@ -61,6 +61,7 @@ def made(name: str, where: str, state: Path, register_map: RegisterMap) -> Bench
     return Bench(state, register_map)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("where", ["the rig's own", "of the store", "in a slot"])
 @pytest.mark.parametrize("name", GIVEN)
 def test_committing_the_read_back_of_the_active_set_changes_nothing(name, where, tmp_path, register_map):

@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import pytest
+
 from gateway.clients import render_client
 from tests.clients.conftest import CONTROLLERS
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.scenes import MAP, TEXTS, WHERE, cycles
 
 
+@pytest.mark.sampled
 def test_a_rig_that_wants_the_byte_order_first_is_enabled_and_shown_it_once_a_connection(language: str) -> None:
     gateway = GatewayAtHand(MAP, wants_echo=True)
     client = CONTROLLERS[language](TEXTS[language], gateway)
@@ -27,6 +30,7 @@ def test_a_rig_that_wants_the_byte_order_first_is_enabled_and_shown_it_once_a_co
     assert client.enabled and gateway.echoes == 2
 
 
+@pytest.mark.sampled
 def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
     gateway = GatewayAtHand(MAP)
     client = CONTROLLERS[language](TEXTS[language].replace("20480", "20481").replace("16#5000", "16#5001"), gateway)
@@ -35,6 +39,7 @@ def test_a_refused_echo_leaves_the_reason_to_the_command(language: str) -> None:
     assert client.enabled and gateway.exceptions == [(16, 3)] and gateway.echoes == 1
 
 
+@pytest.mark.sampled
 def test_a_gateway_that_answers_another_unit_than_1_is_asked_as_that_unit(language: str) -> None:
     gateway = GatewayAtHand(MAP, units=(7,))
     text = render_client(MAP, {"twincat": "st", "codesys": "st"}.get(language, language), replace(WHERE, unit=7))

@@ -43,6 +43,7 @@ def test_enable_writes_the_whole_command_once_and_then_a_new_heartbeat_each_time
     assert not client.enabled
 
 
+@pytest.mark.sampled
 def test_a_refused_force_is_told_and_the_last_accepted_one_goes_on(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
@@ -133,6 +134,7 @@ def test_a_force_that_the_map_does_not_allow_enables_nothing(client: Any, gatewa
     assert "0.00 .. 327.67" in client.text
 
 
+@pytest.mark.sampled
 def test_after_a_fault_nothing_is_enabled_until_it_is_asked_for_again(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
@@ -154,6 +156,7 @@ def test_after_a_fault_nothing_is_enabled_until_it_is_asked_for_again(client: An
     assert client.enabled and not client.ended and not client.text
 
 
+@pytest.mark.sampled
 def test_a_loss_while_enabled_ends_in_off_and_stays_there(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)

@@ -102,11 +102,13 @@ def course(response: Response | None, life: Callable[[Bench], None] | None, mode
     return [number for one in bench.history for number in (one.output.voltage_v, float(one.output.limited_by))]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("life", LIVES, ids=lambda life: life.__name__.strip("_"))
 def test_behind_whatever_was_before_an_enable_begins_as_behind_a_start(life: Callable[[Bench], None]) -> None:
     assert course(None, life) == pytest.approx(course(None, None), abs=1.0e-6)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("life", LIVES, ids=lambda life: life.__name__.strip("_"))
 def test_where_a_vented_tool_starts_apart_from_one_that_lost_its_contact_it_does_so_too(
     life: Callable[[Bench], None],

@@ -34,6 +34,7 @@ def loaded(folder: Path, name: str, **changes: Any) -> list[str]:
 PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressure_pa": [0, 10]}}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("changes", "told"),
     [

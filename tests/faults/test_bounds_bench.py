@@ -11,6 +11,7 @@ ROWS: tuple[tuple[str, float, Callable[[int], float]], ...] = BENCH["ROWS"]
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("name", "bound_s", "measure"), ROWS, ids=[name for name, *_ in ROWS])
 def test_the_safe_voltage_is_on_the_wire_within_the_bound(
     name: str, bound_s: float, measure: Callable[[int], float], budget: int

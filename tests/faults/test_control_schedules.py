@@ -239,6 +239,7 @@ def test_random_faults_break_no_invariant(life: Life) -> None:
         assert_invariant(life.history[: life.disturbed])
 
 
+@pytest.mark.sampled
 def test_after_healing_and_reset_the_force_is_in_band_within_two_seconds(life: Life) -> None:
     assert life.took_s <= 2.0, f"I13: {life.history[-1].output}"
     for assert_invariant in INVARIANTS:

@@ -72,6 +72,7 @@ def run_in(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scope", ["function", "module"])
 @pytest.mark.parametrize(
     ("each_s", "name", "passes_at", "end"),

@@ -152,6 +152,7 @@ def complaints_of(folder: str) -> list[str]:
     ]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("folder", [*(f"gateway/{room}" for room in ROOMS), "tools"])
 def test_public_docstrings_open_with_a_verb(folder: str) -> None:
     complaints = complaints_of(folder)

@@ -72,6 +72,7 @@ def test_counters_and_age_can_be_read(wired, reports):
     assert not {"nonsense", "rms_n"} & set(figures)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     "request_",
     [

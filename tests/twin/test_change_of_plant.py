@@ -91,6 +91,7 @@ def test_the_same_plant_again_changes_nothing() -> None:
         assert (one.force_n, one.pressure_pa, one.read()) == (other.force_n, other.pressure_pa, other.read())
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", DEMONSTRATIONS)
 def test_an_effect_begins_without_a_jump_and_then_shows(name: str) -> None:
     twin = pressing()

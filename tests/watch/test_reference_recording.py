@@ -197,8 +197,9 @@ def test_a_calibration_that_came_into_use_while_the_clock_was_ahead_finds_its_re
 def test_a_recording_from_before_the_calibration_came_into_use_is_none(tmp_path):
     record(tmp_path)
     use_calibration(tmp_path, 2)
-    os.utime(tmp_path / "calibrations" / "active.000001", (2.0e12, 2.0e12))
-    assert FirstGoodRecording(tmp_path).keep(1.0e12) is None
+    used_s = time.time() + 1e5
+    os.utime(tmp_path / "calibrations" / "active.000001", (used_s, used_s))
+    assert FirstGoodRecording(tmp_path).keep(used_s + 1e5) is None
 
 
 @pytest.mark.parametrize(("name", "spoilt"), [("file", 3), ("file", None), ("file", "\0"), ("name", None)])

@@ -131,6 +131,7 @@ def test_commands_with_reversals_agree_to_the_bit(library, name, level):
     assert build.share(state) == model.branch_share(memory)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", ORDINARY)
 def test_float32_stays_near_the_double_model(name):
     branches = CASES[name].model().branches
@@ -162,6 +163,7 @@ def test_newton_needs_far_fewer_rounds_than_it_may_take():
         assert model_of(name).rounds_max <= ROUNDS_MAX // 3
 
 
+@pytest.mark.sampled
 @needs_gcc
 @every_case
 def test_what_goes_in_as_volts_comes_back_as_volts(library, name):
@@ -242,6 +244,7 @@ def along_n(name: str) -> list[float]:
     return forces
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", [*SLIP, "demo", "order_2", "order_15"])
 def test_commands_with_reversals_stay_near_the_double_model(name):
     model, single = CASES[name].model(), model_of(name)
@@ -254,6 +257,7 @@ def test_commands_with_reversals_stay_near_the_double_model(name):
         assert abs(float(single.command(state, Float32(force_n))[0]) - wanted_v) < 2e-5
 
 
+@pytest.mark.sampled
 @needs_gcc
 @every_case
 def test_each_passes_its_own_self_test(library, name):

@@ -165,6 +165,7 @@ HOSTILE = (
 )
 
 
+@pytest.mark.sampled
 @needs_gcc
 @pytest.mark.parametrize("text", HOSTILE)
 def test_no_text_of_a_calibration_can_leave_its_comment(tmp_path, text):
@@ -216,6 +217,7 @@ def test_a_name_becomes_a_c_name(name, prefix):
     assert sorted(c_source(replace(CASES["demo"], name=name))) == [f"{prefix}.c", f"{prefix}.h"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", range(1, 16))
 def test_every_order_with_a_usable_slope_becomes_c(order):
     for seed in range(3):

@@ -24,6 +24,7 @@ def total(of: ProjectedProblem, theta: Floats, ridge: float) -> Floats:
     return of.evaluate(theta).cost + ridge * np.sum(theta**2, axis=1)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize(("ridge", "bound"), [(1e-6, 6.0), (1e-6, 0.5), (0.03, 6.0), (0.03, 0.5), (1.0, 0.5)])
 def test_the_descent_ends_where_an_independent_optimiser_does(order: int, ridge: float, bound: float) -> None:

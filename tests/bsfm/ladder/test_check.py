@@ -213,6 +213,7 @@ def test_rows_without_numbers_are_left_out_with_the_first_one_named() -> None:
     )
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("value", [-9999.0, 9999.0, -999.25, 1.0e30])
 @pytest.mark.parametrize("name", ["force_n", "command_v"])
 def test_what_a_logger_writes_for_no_value_is_no_reading(name: str, value: float) -> None:

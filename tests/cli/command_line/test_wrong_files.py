@@ -62,6 +62,7 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recording: bytes) -> 
     return tmp_path
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("verb", RECORDING_VERBS)
 @pytest.mark.parametrize("name", WHAT)
 def test_a_verb_that_wants_a_recording_says_what_it_got(verb: str, name: str, files: Path, call: Call) -> None:
@@ -78,6 +79,7 @@ def test_a_verb_that_wants_a_recording_says_what_it_got(verb: str, name: str, fi
 RIGHT = {("check", "calibration.yaml"), ("calibration show --state state", "calibration.yaml")}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("verb", "name"),
     [(verb, name) for verb in PROFILE_VERBS for name in WHAT if name != "rig.yaml" and (verb, name) not in RIGHT],

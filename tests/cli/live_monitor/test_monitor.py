@@ -120,6 +120,7 @@ def test_buckets_are_means_with_the_newest_at_the_right() -> None:
     assert buckets(points, 59.9, 6)[0] == TrackPoint(0.0, 1.0, 0.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("width", "height"), [(80, 24), (81, 25), (100, 30), (112, 34), (160, 50), (240, 70)])
 def test_a_frame_fits_any_terminal_from_80_by_24(width: int, height: int, holding: Track) -> None:
     for writers in (None, {"command": Writer("192.168.125.101", "50001", 3.0)}):

@@ -61,6 +61,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("what", ["request", "answer"])
 @pytest.mark.parametrize("number", range(5))
 def test_one_lost_frame_costs_one_repetition(gateway, line, call, file, noise, number, what) -> None:

@@ -77,6 +77,7 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("fc06", [[], ["--fc06"]])
 @pytest.mark.parametrize("order", [1, 2, 15])
 def test_an_upload_is_stored_used_and_read_back(gateway, address, call, tmp_path, order, fc06):

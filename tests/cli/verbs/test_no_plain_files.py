@@ -33,6 +33,7 @@ def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: Call) -> Path:
     return tmp_path / "state"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("kind", MAKERS)
 @pytest.mark.parametrize(("name", "verb"), IN_THE_STATE)
 def test_no_verb_waits_for_what_stands_in_the_state(name: str, verb: str, kind: str, state: Path, call: Call) -> None:

@@ -72,6 +72,7 @@ def test_what_is_asked_for_between_two_attempts_does_not_go_out_with_the_next_co
     assert client.ended or ask is not enable
 
 
+@pytest.mark.sampled
 def test_an_enable_behind_the_new_connection_goes_out(client: Any, gateway: GatewayAtHand) -> None:
     be_lost(client, gateway)
     enable(client)
@@ -87,6 +88,7 @@ def test_an_enable_behind_the_new_connection_goes_out(client: Any, gateway: Gate
     assert gateway.bank.command.force_setpoint_n == 12.0 and client.enabled and not client.ended
 
 
+@pytest.mark.sampled
 def test_an_upload_that_is_asked_for_between_two_attempts_is_not_sent_later(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -111,6 +113,7 @@ def test_a_robot_that_asks_while_it_is_lost_is_told_so_at_once_and_nothing_goes_
     assert gateway.words == [] and not robot.enabled
 
 
+@pytest.mark.sampled
 def test_what_has_ended_is_told_until_the_next_enable(client: Any, gateway: GatewayAtHand) -> None:
     """C and Python forgot it with a disable, as a program's own way out of it."""
     client.enable(12.0)

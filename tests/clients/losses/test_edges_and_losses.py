@@ -23,6 +23,7 @@ def tares(gateway: GatewayAtHand) -> list[int]:
     return [words[0] for words in gateway.words if words[0] & ~1]
 
 
+@pytest.mark.sampled
 def test_a_force_is_sent_as_the_nearest_count(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.346)
     cycles(client)
@@ -69,6 +70,7 @@ def test_a_tare_asked_for_between_a_question_and_its_answer_is_not_lost(language
     assert tares(gateway) == [TARE | 1]
 
 
+@pytest.mark.sampled
 def test_a_second_upload_is_staged_as_the_first_was(client: Any, gateway: GatewayAtHand) -> None:
     for _ in range(2):
         client.begin_upload(MODEL, 3)
@@ -77,6 +79,7 @@ def test_a_second_upload_is_staged_as_the_first_was(client: Any, gateway: Gatewa
     assert gateway.uploads[:5] == gateway.uploads[5:]
 
 
+@pytest.mark.sampled
 def test_an_upload_that_a_loss_has_cut_does_not_go_on_by_itself(client: Any, gateway: GatewayAtHand) -> None:
     """What was staged before may be another master's by then."""
     client.begin_upload(MODEL, 3)
@@ -95,6 +98,7 @@ def test_an_upload_that_a_loss_has_cut_does_not_go_on_by_itself(client: Any, gat
     assert len(gateway.uploads) == 1 and not client.uploaded
 
 
+@pytest.mark.sampled
 def test_an_upload_that_is_refused_ends_and_says_why(client: Any, gateway: GatewayAtHand) -> None:
     answer, asked = gateway.answer, list[bytes]()
 
@@ -187,6 +191,7 @@ def test_a_tare_that_is_refused_is_asked_for_once(client: Any, gateway: GatewayA
     assert len(asked) == 1
 
 
+@pytest.mark.sampled
 def test_an_upload_that_is_refused_costs_no_force(client: Any, gateway: GatewayAtHand) -> None:
     answer = gateway.answer
     client.enable(12.0)

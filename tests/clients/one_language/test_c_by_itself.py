@@ -19,6 +19,7 @@ def program(gateway: GatewayAtHand) -> CProgram:
     return CProgram(TEXTS["c"], gateway)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("counts", "word"), [(-200.0, 65336), (-200.4, 65336), (-200.6, 65335), (-0.4, 0), (0.4, 0), (200.6, 201)]
 )

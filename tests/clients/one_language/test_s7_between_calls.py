@@ -18,6 +18,7 @@ def client(gateway: GatewayAtHand) -> S7:
     return S7(TEXTS["scl"], gateway)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("scans", range(1, 16))
 def test_an_enable_that_falls_before_its_answer_has_come_is_stopped(
     client: S7, gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch, scans: int

@@ -118,6 +118,7 @@ def test_a_heartbeat_that_the_gateway_has_seen_of_another_is_left_out(
     assert [words[4] for _, words in gateway.writes[seen:]] == [2] and "W204" in client.text
 
 
+@pytest.mark.sampled
 def test_an_enable_right_behind_a_reset_waits_until_the_reset_is_taken(client: Any, gateway: GatewayAtHand) -> None:
     """In one write they would be refused: a reset needs enable 0 and force 0."""
     client.enable(12.0)
@@ -131,6 +132,7 @@ def test_an_enable_right_behind_a_reset_waits_until_the_reset_is_taken(client: A
     assert not gateway.exceptions and client.enabled
 
 
+@pytest.mark.sampled
 def test_a_force_that_is_refused_during_an_upload_ends_no_upload(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
@@ -173,6 +175,7 @@ def test_an_upload_that_is_refused_forgets_no_command_that_waits_in_c(gateway: G
     assert commands(gateway) == [command(1, 1200), command(0, 0)] and not program.enabled
 
 
+@pytest.mark.sampled
 def test_a_heartbeat_goes_on_while_a_commit_is_written_to_the_disk(client: Any, gateway: GatewayAtHand) -> None:
     """That may take longer than a lease."""
     client.enable(12.0)
@@ -213,6 +216,7 @@ def test_a_robot_s_task_that_starts_again_while_a_force_was_asked_for_says_that_
     assert not client.ended
 
 
+@pytest.mark.sampled
 def test_a_refusal_of_something_else_turns_no_pull_into_a_push(client: Any, gateway: GatewayAtHand) -> None:
     """A tare that comes too early, between the program's choice of the direction and its enable."""
     client.pull(pulls=True)

@@ -50,6 +50,7 @@ def test_a_word_that_is_set_while_another_master_presses_is_not_its_stop(client:
     assert gateway.bank.command.force_ramp_n_per_s == 50.0, "it waited for the other one's end"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("edge", ["tare", "reset"])
 def test_an_edge_that_is_asked_for_while_another_master_presses_is_refused_and_not_its_stop(
     client: Any, gateway: GatewayAtHand, edge: str
@@ -76,6 +77,7 @@ def test_a_guest_that_connects_again_stops_nobody(client: Any, gateway: GatewayA
     assert held_elsewhere(gateway) and len(gateway.writes) == count
 
 
+@pytest.mark.sampled
 def test_a_word_that_is_set_while_nobody_presses_goes_out_and_with_the_next_enable(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -116,6 +118,7 @@ def test_a_force_that_changes_each_cycle_does_not_undo_another_master_s_stop(
     assert gateway.bank.command.force_setpoint_n == 0.0 and gateway.bank.owner is None
 
 
+@pytest.mark.sampled
 def test_a_force_that_another_master_has_taken_over_is_asked_to_be_taken_back_no_more_than_twice(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -177,6 +180,7 @@ def test_a_pull_that_is_asked_for_behind_a_stop_writes_nothing(client: Any, gate
     assert gateway.bank.owner is None and len(gateway.writes) == written
 
 
+@pytest.mark.sampled
 def test_a_pull_and_a_tare_go_out_while_the_force_stands(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)

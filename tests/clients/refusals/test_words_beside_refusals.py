@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
+import pytest
+
 from gateway.codes.faults import FaultCode
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.c_program import OK, CProgram
@@ -16,6 +18,7 @@ from tests.clients.test_in_band import set_voltage
 VOLTAGE, TOO_MUCH_MV = 5, 20000
 
 
+@pytest.mark.sampled
 def test_the_words_beside_a_refused_enable_stay_as_they_were_set(client: Any, gateway: GatewayAtHand) -> None:
     """A program sets its ramp once, and its enable comes before the reset: the next one pressed with the rig's own ramp."""
     cycles(client)
@@ -44,6 +47,7 @@ def set_voltage_of(client: Any, millivolts: int) -> None:
         set_voltage(client, millivolts)
 
 
+@pytest.mark.sampled
 def test_a_word_that_is_wrong_is_not_asked_for_without_an_end(client: Any, gateway: GatewayAtHand) -> None:
     """Once beside the enable, once alone."""
     cycles(client)

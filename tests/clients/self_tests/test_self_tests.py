@@ -31,6 +31,7 @@ def begin(client: Any, gateway: GatewayAtHand) -> None:
     assert gateway.is_testing and client.is_testing and not client.found, client.text
 
 
+@pytest.mark.sampled
 def test_a_self_test_is_begun_once_held_by_the_heartbeat_and_told_item_by_item(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -48,6 +49,7 @@ def test_a_self_test_is_begun_once_held_by_the_heartbeat_and_told_item_by_item(
     assert commands(gateway) == [BEGUN] and len(gateway.beats) == beats
 
 
+@pytest.mark.sampled
 def test_a_second_self_test_is_another_and_a_force_may_follow(client: Any, gateway: GatewayAtHand) -> None:
     for verdict, result in ((SelfTestVerdict.WARNED, "warned"), (SelfTestVerdict.PASSED, "passed")):
         begin(client, gateway)
@@ -59,6 +61,7 @@ def test_a_second_self_test_is_another_and_a_force_may_follow(client: Any, gatew
     assert client.enabled and commands(gateway) == [BEGUN, command(1, 1200)]
 
 
+@pytest.mark.sampled
 def test_a_self_test_that_is_let_go_ends_at_once(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     client.end_self_test()
@@ -78,6 +81,7 @@ def test_a_self_test_that_is_refused_says_why_and_is_asked_for_once(client: Any,
     assert gateway.bank.command.force_setpoint_n == 7.0
 
 
+@pytest.mark.sampled
 def test_a_fault_ends_a_self_test_and_is_told(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     gateway.fail(FaultCode.OVER_FORCE)
@@ -87,6 +91,7 @@ def test_a_fault_ends_a_self_test_and_is_told(client: Any, gateway: GatewayAtHan
     assert commands(gateway) == [BEGUN]
 
 
+@pytest.mark.sampled
 def test_behind_a_loss_during_a_self_test_the_first_write_is_off(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     gateway.is_cut = True
@@ -98,6 +103,7 @@ def test_behind_a_loss_during_a_self_test_the_first_write_is_off(client: Any, ga
     assert commands(gateway) == [BEGUN, OFF] and not gateway.is_testing
 
 
+@pytest.mark.sampled
 def test_what_is_asked_for_while_a_gateway_is_lost_begins_no_self_test_later(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -117,6 +123,7 @@ def test_what_is_asked_for_while_a_gateway_is_lost_begins_no_self_test_later(
     assert commands(gateway) == [BEGUN]
 
 
+@pytest.mark.sampled
 def test_a_tare_right_behind_the_end_begins_no_other_self_test(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     gateway.end_self_test(SelfTestResult.PASSED)
@@ -141,6 +148,7 @@ def test_a_tare_at_the_end_begins_no_other_self_test_wherever_the_request_of_a_p
     assert commands(gateway) == [BEGUN] and client.found["result"] == "passed"
 
 
+@pytest.mark.sampled
 def test_an_enable_during_a_self_test_does_not_press_behind_it(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     client.enable(12.0)
@@ -163,6 +171,7 @@ def test_a_self_test_in_place_of_a_force_waits_for_off(client: Any, gateway: Gat
     assert not gateway.exceptions and not client.ended
 
 
+@pytest.mark.sampled
 def test_a_force_in_place_of_a_self_test_is_none(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     client.end_self_test()
@@ -196,6 +205,7 @@ def test_an_enable_that_is_taken_back_during_a_self_test_leaves_that_alone(clien
     assert gateway.is_testing and client.is_testing and commands(gateway) == [BEGUN]
 
 
+@pytest.mark.sampled
 def test_a_reset_ends_a_self_test_too(client: Any, gateway: GatewayAtHand) -> None:
     """The gateway refuses it, busy, and the stop beside it: OFF goes out all the same."""
     begin(client, gateway)
@@ -220,6 +230,7 @@ def test_every_language_says_a_state_in_words(language: str, gateway: GatewayAtH
     assert [say(state) for state in State] == [state.name.lower() for state in State]
 
 
+@pytest.mark.sampled
 def test_a_tare_during_a_self_test_is_told_to_be_none(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     client.tare()
@@ -228,6 +239,7 @@ def test_a_tare_during_a_self_test_is_told_to_be_none(client: Any, gateway: Gate
     assert gateway.is_testing and client.is_testing
 
 
+@pytest.mark.sampled
 def test_a_self_test_is_in_no_band_and_a_force_beside_it_is_not_written(client: Any, gateway: GatewayAtHand) -> None:
     begin(client, gateway)
     assert not in_band(client)

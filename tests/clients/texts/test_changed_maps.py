@@ -23,6 +23,7 @@ def tenths(tmp_path: Path) -> RegisterMap:
     return own_map(tmp_path, FORCE, FORCE.replace("0.01", "0.1"))
 
 
+@pytest.mark.sampled
 def test_a_client_of_another_map_says_so_and_commands_nothing(language: str, tenths: RegisterMap) -> None:
     gateway = GatewayAtHand(tenths)
     client = CONTROLLERS[language](TEXTS[language], gateway)
@@ -39,6 +40,7 @@ def test_a_client_of_another_map_says_so_and_commands_nothing(language: str, ten
     assert set(gateway.requests) == {HASH}, "no force, no upload, no proof of the byte order"
 
 
+@pytest.mark.sampled
 def test_of_another_map_it_asks_less_and_less_often(language: str, tenths: RegisterMap) -> None:
     """Each answer of that gateway was a success, behind which the pause began anew."""
     gateway = GatewayAtHand(tenths)
@@ -51,6 +53,7 @@ def test_of_another_map_it_asks_less_and_less_often(language: str, tenths: Regis
         assert 4 <= gateway.requests.count(HASH) <= 10, "in 20 s, at pauses of 0.25 to 4 s"
 
 
+@pytest.mark.sampled
 def test_a_gateway_that_comes_back_with_another_map_is_not_commanded(language: str, tenths: RegisterMap) -> None:
     """Not even the OFF behind a loss: what has another map by now has started anew, in OFF."""
     gateway = GatewayAtHand(MAP)
@@ -92,6 +95,7 @@ def test_a_gateway_that_has_its_hash_elsewhere_or_answers_another_unit_is_not_co
     assert "map_hash is refused: another map or unit" in client.text
 
 
+@pytest.mark.sampled
 def test_a_hash_that_differs_in_one_byte_is_another_map_s(client: Any, gateway: GatewayAtHand) -> None:
     answer = gateway.answer
     right = answer(HASH)

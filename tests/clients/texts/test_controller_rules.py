@@ -196,6 +196,7 @@ def test_a_word_of_the_command_of_a_universal_robot_is_whole_and_has_16_bits() -
     assert commands(gateway) == [(*command(1, 1200)[:9], 13, 0, 0)]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("language", LANGUAGES)
 @pytest.mark.parametrize(
     ("where", "told"),

@@ -32,6 +32,7 @@ def words_of(model: dict[str, Any]) -> bytes:
     return bytes(data)
 
 
+@pytest.mark.sampled
 def test_an_upload_is_staged_committed_and_awaited(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(4.0)
     cycles(client)
@@ -49,6 +50,7 @@ def test_an_upload_is_staged_committed_and_awaited(client: Any, gateway: Gateway
     assert client.enabled, "the heartbeat went on meanwhile"
 
 
+@pytest.mark.sampled
 def test_an_upload_that_fails_says_why(client: Any, gateway: GatewayAtHand) -> None:
     client.begin_upload(MODEL | {"rising_b": [0.0, 70.0, 60.0]}, 0)
     cycles(client, 8)

@@ -44,6 +44,7 @@ def send_parts(client: Any, gateway: GatewayAtHand, parts: int) -> None:
         client.scan() if isinstance(client, Plc) else client.cycle()
 
 
+@pytest.mark.sampled
 @PARTS
 @pytest.mark.parametrize("language", ["scl", "twincat", "codesys"])
 def test_a_set_that_a_plc_fills_anew_while_one_is_sent_takes_no_part_in_that(

@@ -40,6 +40,7 @@ class WeightBench(Bench):
         self.run(4.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("weight_n", STEEP)
 @pytest.mark.parametrize("has_weight", [True, False], ids=["there", "taken for zero, or not there"])
 def test_the_first_rise_is_judged_with_what_presses_besides(weight_n: float, has_weight: bool) -> None:

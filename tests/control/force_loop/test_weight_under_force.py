@@ -28,6 +28,7 @@ def beyond_n(bench: Bench, seen: int, slide_n: float) -> float:
     return max(way * (record.force_n - slide_n) for record in bench.history[seen:])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("every_ms", [10, 100])
 @pytest.mark.parametrize(("before_kg", "after_kg"), [(1.0, 0.01), (0.5, 0.01), (0.01, 1.0)])
 def test_another_payload_is_no_error_of_the_force(before_kg: float, after_kg: float, every_ms: int) -> None:

@@ -73,6 +73,7 @@ def test_a_healthy_machine_passes_within_20_s_and_below_the_stated_force(seed: i
     assert rig.controller.state is State.OFF and rig.output and rig.output.voltage_v == 0.0
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", BROKEN)
 @pytest.mark.parametrize("seed", [5, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(20) if seed != 5)])
 def test_each_fault_is_found_by_its_own_item_and_by_no_other(seed: int, name: str) -> None:

@@ -26,6 +26,7 @@ def test_devices_with_checksum_frame_and_bare_line_are_among_them() -> None:
     assert {profile.is_modbus for profile in OUTPUTS} == {True, False}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("profile", OUTPUTS, ids=lambda profile: profile.name)
 @given(share=st.floats(0.0, 1.0))
 def test_a_setting_reads_as_its_template_says(profile: DeviceProfile, share: float) -> None:

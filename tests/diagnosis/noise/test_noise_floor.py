@@ -35,6 +35,7 @@ def test_rests_show_white_noise_as_it_is(seed: int) -> None:
     assert 0.0 < found.error_share < 0.01
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("corner_hz", [0.1, 0.5, 2.0])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_slow_noise_makes_the_floor_no_higher_than_it_is(seed: int, corner_hz: float) -> None:

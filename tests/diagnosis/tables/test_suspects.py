@@ -34,6 +34,7 @@ def only(found: Measurement, plant: Plant = MACHINE, *, is_own: bool = True) -> 
     return one.code, one.column, one.unit or one.other
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("is_own", [True, False])
 @pytest.mark.parametrize("unit", ["kgf", "gf", "lbf", "mn", "kn"])
 @pytest.mark.parametrize("given", [COMMANDED, PRESSED], ids=["command", "pressure"])

@@ -231,6 +231,7 @@ def test_what_a_column_of_quality_calls_good_may_still_be_no_witness() -> None:
     assert np.flatnonzero(~found.usable).tolist() == [7, *range(400, 500)]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("good", ["ok", "Good", "VALID"])
 @pytest.mark.parametrize("bad", ["bad", "Invalid", "OVERLOAD"])
 def test_a_reading_that_its_logger_calls_bad_in_whatever_word_is_no_witness(

@@ -74,6 +74,7 @@ def test_it_shows_all_that_the_contract_asks_for() -> None:
         assert text in html
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("changed", [True, False])
 @pytest.mark.parametrize("columns", range(4))
 def test_no_place_of_a_grid_is_empty(columns: int, changed: bool) -> None:
@@ -207,6 +208,7 @@ CHANGED = (
 )  # fmt: skip
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(("changes", "answer", "lack"), CHANGED)
 def test_the_answer_says_how_much_is_explained_and_what_is_lacking(
     changes: dict[str, object], answer: str, lack: str

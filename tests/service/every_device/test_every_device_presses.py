@@ -33,6 +33,7 @@ def rig_with(profile: DeviceProfile) -> Rig:
     return replace(rig, load_cell=line)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", PRESSING)
 def test_a_device_presses_and_measures_in_a_whole_rig(name: str) -> None:
     wired = Wired(rig_with(PROFILES[name]))

@@ -80,6 +80,7 @@ def test_there_is_a_profile_of_each_kind() -> None:
     assert CELLS
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", OUTPUTS)
 def test_an_output_follows_a_moving_setpoint_for_five_seconds_at_its_own_speed(name: str) -> None:
     profile = PROFILES[name]
@@ -141,6 +142,7 @@ def carry(source: int, target: int, data: bytes) -> bytes:
     return found
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", PROFILES)
 def test_both_ends_understand_each_other_over_a_pty(name: str, pty: Pty) -> None:
     profile = PROFILES[name]

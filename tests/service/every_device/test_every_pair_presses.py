@@ -33,6 +33,7 @@ def text_of(output: DeviceProfile, cell: DeviceProfile) -> str:
     return RIG.format(output=output, cell=cell, more=more, timeout_s=0.25, unwatched=unwatched)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("number", range(len(OUTPUTS)))
 def test_a_pair_is_a_rig_that_presses_when_it_is_simulated(number: int, tmp_path: Path, budget: int) -> None:
     """In the gate each output with one load cell, so that each load cell has its turn; with --long with all of them."""

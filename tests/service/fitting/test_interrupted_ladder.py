@@ -130,6 +130,7 @@ def test_wherever_a_run_is_cut_only_whole_groups_count_and_the_others_are_climbe
     assert seen == {0, 1, 2}
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("stair", [0, 4, 9, 20, 26, 34, 43, 60])
 def test_a_run_that_was_cut_gives_a_calibration_as_good_as_one_that_was_not(runs, stair: int, tmp_path: Path) -> None:
     cut = int(np.searchsorted(runs.whole.columns["stair"], stair)) + 20

@@ -20,6 +20,7 @@ def simulate(wired: Wired, *, clear_all: bool = False, **values: object) -> None
     wired.world.simulate({"do": "sim", "set": named, "clear_all": clear_all})
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("name", "value", "fault"),
     [

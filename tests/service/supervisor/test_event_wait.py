@@ -27,6 +27,7 @@ def as_at_start():
         signal.signal(number, handler)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("name", _STRAY + _STOPS)
 def test_a_stray_signal_ends_neither_the_guardian_nor_its_children(as_at_start, name):
     number = signal.Signals[name]

@@ -23,6 +23,7 @@ from tests.service.supervisor.scripted_children import (
 __all__ = ["port", "scene"]
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("code", [-9, 1, 0, None])
 @pytest.mark.parametrize("steps", range(9))
 def test_a_control_process_that_dies_at_the_nth_step_is_started_again(scene, port, steps, code):

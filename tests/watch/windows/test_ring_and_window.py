@@ -30,6 +30,7 @@ def is_window(rate_hz: float, window_s: float) -> bool:
     return isinstance(window_of(data, COLUMNS, window_s), Window)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("rate_hz", "window_s"),
     [(100.0, 600.0), (200.0, 360.0), (200.0, 370.0), (500.0, 143.0), (500.0, 146.0), (1200.0, 60.0)],

@@ -148,6 +148,7 @@ def test_semicolons_with_decimal_commas_and_kgf_are_understood(tmp_path: Path, c
     assert any("kgf" in note for note in document["notes"])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("change", "words"),
     [

@@ -76,6 +76,7 @@ def test_json_to_stdout_is_nothing_but_json(tmp_path: Path, call: Call, engine: 
     assert json.loads(answer.stdout)["verdict"] == "partial"
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("verdict", "fail_on", "code"),
     [

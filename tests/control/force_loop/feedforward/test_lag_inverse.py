@@ -99,6 +99,7 @@ def test_a_way_down_hardly_passes_the_wish_where_the_shorter_lag_ends_before_a_s
     assert to_v - min(course_v) < 0.04 * (from_v - to_v)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("lags", LAGS + RINGING)
 def test_lags_that_are_a_tenth_off_make_no_more_than_a_tenth_of_the_step(lags):
     for off in (0.9, 1.1):

@@ -57,6 +57,7 @@ def test_it_may_come_down_and_be_tilted_before(payload_kg: float, from_deg: floa
     assert bench.last.force_measured_n == pytest.approx(25.0, abs=1.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("payload_kg", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize(("unit", "faults"), [(-1.0, {"SIGN_INVERTED"}), (9.81, {"GAIN_WRONG", "OVER_FORCE"})])
 def test_a_cell_that_is_wrong_is_found_with_it_all_the_same(payload_kg: float, unit: float, faults: set[str]) -> None:

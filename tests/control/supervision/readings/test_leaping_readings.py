@@ -48,6 +48,7 @@ def moved_n(bench: Bench, *said_n: float) -> float:
     return max(abs(record.force_n - held_n) for record in bench.history[seen:])
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("said_n", [58.0, 3.0, -20.0])
 @pytest.mark.parametrize("every_ms", [10, 50, 100])
 def test_one_false_reading_does_not_move_a_held_force(said_n: float, every_ms: int) -> None:

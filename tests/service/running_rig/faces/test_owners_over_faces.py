@@ -38,6 +38,7 @@ def _beats_in_vain(rig: SmallRig, peer: Peer) -> None:
     assert (rig.state, rig.wire.voltage_v) == (State.FAULT, 0.0)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("takes_over", [False, True])
 @pytest.mark.parametrize(("owner", "other"), [(PAGE, ROBOT), (ROBOT, BUS), (BUS, PLC), (PLC, PAGE), (ROBOT, PLC)])
 def test_the_heartbeat_of_its_owner_alone_keeps_a_force_up(owner: Peer, other: Peer, takes_over: bool) -> None:
@@ -48,6 +49,7 @@ def test_the_heartbeat_of_its_owner_alone_keeps_a_force_up(owner: Peer, other: P
     _beats_in_vain(rig, owner if takes_over else other)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("words", [(0, 0), (0, ENABLE | TAKE, 600, 0, 0, 77), (0, TARE), (0, RESET), (4, 80), (1, 400)])
 def test_a_broadcast_on_a_bus_does_what_the_same_request_does_and_says_nothing(
     words: tuple[int, ...], monkeypatch: pytest.MonkeyPatch

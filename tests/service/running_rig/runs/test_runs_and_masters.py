@@ -57,6 +57,7 @@ CLEARS: dict[str, Callable[[SmallRig], None]] = {
 }
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("way", CLEARS)
 def test_clearing_bit_5_takes_the_force_to_0_along_the_ramp(way: str) -> None:
     rig = with_ramp().calibrating()

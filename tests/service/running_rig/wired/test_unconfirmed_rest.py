@@ -36,6 +36,7 @@ def disobeying(fault: FaultCode) -> Wired:
     return wired
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("let_go", [disable, ramp_to_zero])
 @pytest.mark.parametrize("fault", DISOBEDIENCE, ids=lambda fault: fault.name.lower())
 def test_a_force_that_is_let_go_into_an_output_that_does_not_obey_is_a_fault_and_not_off(

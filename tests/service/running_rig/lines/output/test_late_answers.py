@@ -52,6 +52,7 @@ def test_a_late_answer_is_not_taken_for_the_next_one(wire: Wire, every: int, slo
     assert wire.exchange.pressure_pa == pytest.approx(7 * 0.9e6 / 1023)
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("slow_s", [0.065, 0.07, 0.08, 0.09, 0.099, 0.115, 0.13, 0.18])
 @pytest.mark.parametrize("step", [1, 3, 7, -2])
 def test_a_device_that_is_always_late_is_no_device_that_alters(wire: Wire, slow_s: float, step: int) -> None:
