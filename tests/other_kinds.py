@@ -4,7 +4,7 @@ import os
 import signal
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -14,8 +14,9 @@ _BOUND_S: Final = 20.0
 
 
 def _bind(path: Path) -> None:
-    with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(str(path))
+    """By its name alone: a whole path may be too long for a socket."""
+    with socket.socket(socket.AF_UNIX) as listener, chdir(path.parent):
+        listener.bind(path.name)
 
 
 MAKERS: Final[dict[str, Callable[[Path], object]]] = {

@@ -69,7 +69,6 @@ def seen_in_band(client: Any, count: int = 6) -> list[bool]:
     return seen
 
 
-@pytest.mark.sampled
 def test_a_new_force_is_not_in_band_because_the_old_one_was(client: Any, gateway: GatewayAtHand) -> None:
     """A program that asks for more and waits for that bit went to the part at once: it had to wait 0.2 s first."""
     ramp_above(gateway, 12.0)
@@ -112,7 +111,6 @@ def test_a_new_force_beside_an_exchange_is_not_in_band_because_the_old_one_was(l
     assert len(seen) > 400 and not any(seen)
 
 
-@pytest.mark.sampled
 def test_a_force_that_was_refused_is_not_in_band_because_the_last_one_that_was_taken_is(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -137,7 +135,6 @@ def test_a_force_that_was_refused_is_not_in_band_because_the_last_one_that_was_t
     assert in_band(client) and gateway.bank.command.force_setpoint_n == 13.0
 
 
-@pytest.mark.sampled
 def test_a_push_is_not_in_band_for_who_asked_for_a_pull_that_was_refused(client: Any, gateway: GatewayAtHand) -> None:
     """W307, the valve cannot follow: the program waited for that bit, and lifted a part that was pushed."""
     if isinstance(client, PythonProgram | CProgram):
@@ -171,7 +168,6 @@ def test_a_force_that_another_master_takes_over_is_in_band_for_nobody_else(clien
     assert client.ended and not any([in_band(client), *seen_in_band(client, 2)])
 
 
-@pytest.mark.sampled
 def test_a_force_that_another_program_of_this_address_commands_is_not_in_band(
     client: Any, gateway: GatewayAtHand
 ) -> None:
@@ -198,7 +194,6 @@ def test_a_force_that_a_calibration_lowered_is_in_band_for_who_asked_for_more(
     assert in_band(client) and gateway.bank.command.force_setpoint_n == 9.0
 
 
-@pytest.mark.sampled
 def test_a_force_that_the_status_shows_more_coarsely_is_in_band(language: str, tmp_path: Path) -> None:
     """A map of one's own may show tenths of a newton of a force that is asked for in hundredths."""
     shown = "name: force_requested, address: 103, type: int16, scale: 0."

@@ -141,7 +141,6 @@ def test_a_section_that_cannot_work_is_refused(tmp_path: Path, section: str) -> 
         load_rig(str(file))
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("payload", "result", "pdus"),
     [

@@ -125,7 +125,6 @@ def test_whenever_a_cell_with_a_count_of_noise_freezes_the_loop_finds_it_within_
         assert one.seconds_until(has_fault(FaultCode.SAMPLE_FROZEN), 4.0) <= 2.0
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize("rate_hz", [10.0, 25.0, 80.0])
 @pytest.mark.parametrize("counts", [1.0, 1.5, 3.0])
 def test_400_samples_of_a_count_of_noise_are_enough_to_find_it_within_2_s(rate_hz: float, counts: float) -> None:
@@ -260,7 +259,6 @@ def test_noise_of_another_kind_is_waited_for() -> None:
     assert sum(alarms) / len(alarms) < 10.0
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize(("filtered", "sent"), [(0.9, 1), (0.99, 1), (0.0, 2), (0.0, 10)])
 @pytest.mark.parametrize("counts", [0.3, 1.0, 3.0])
 def test_filtered_and_repeated_samples_are_no_sign_of_death(counts: float, filtered: float, sent: int) -> None:

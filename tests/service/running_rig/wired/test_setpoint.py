@@ -143,7 +143,6 @@ def test_while_not_enabled_a_setpoint_is_kept_and_nothing_is_accepted() -> None:
     wired.until(lambda: abs(wired.force_n - 15.0) <= BAND_N, 1.0)
 
 
-@pytest.mark.sampled
 @pytest.mark.parametrize(
     ("address", "words", "code", "reason"),
     [
