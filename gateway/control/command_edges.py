@@ -12,7 +12,7 @@ from gateway.control.limits import NotFiniteError, narrow_limits
 from gateway.control.messages import master_lost_sentence
 from gateway.control.settings import ControlSettings
 from gateway.control.supervision.lease import Lease
-from gateway.registers.command import Command
+from gateway.registers.command import NO_BEAT, Command
 from gateway.registers.words import RUN_BITS, ControlBit
 from gateway.units import STANDARD_GRAVITY_M_PER_S2
 
@@ -44,7 +44,7 @@ class CommandTracker:
         self.not_finite = ""
         self._word = 0
         self._lease = Lease(settings.supervision.lease_s)
-        self.beats_of = self._lease.beats_of
+        self.beats_of, self.hear_refused = self._lease.beats_of, self._lease.hear_refused
         self._settings = self._rig_settings = settings
         self._adopt_heartbeat = False
         self._direction = 1.0
@@ -88,14 +88,16 @@ class CommandTracker:
         if self._manner is not None and not is_same_manner(command, self.command):
             self._manner = None
         self.command = command
+        channel = command.channel
         if self._adopt_heartbeat:
             self._adopt_heartbeat = False
             if not command.control_word and not command.heartbeat:  # any other value is a master's
                 self._lease.adopt(command.heartbeat)
+                channel = NO_BEAT
         if command.has_waited or command.repeats:
-            self._lease.adopt(command.heartbeat)
+            self._lease.pass_over(command.heartbeat, channel)
         else:
-            self._lease.observe(now_s, command.heartbeat, command.peer, command.channel)
+            self._lease.observe(now_s, command.heartbeat, command.peer, channel)
         if edges.rises & _TAKE:
             self._lease.take_over(now_s, command.peer)
         if edges.stops:

@@ -7,10 +7,11 @@ on with the same heartbeat would begin when that reason is over, whatever its ot
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from typing import Final, NamedTuple
 
 from gateway import defaults
-from gateway.registers.command import Channel
+from gateway.registers.command import NO_BEAT, Channel
 from gateway.registers.writes.ownership import FrameBeats, keep_latest
 
 _CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
@@ -55,7 +56,7 @@ class StartFrame(NamedTuple):
 class _Refused(NamedTuple):
     """What was refused last of a host. heartbeat: its own, as far as it has brought one (`beats`), else the one that stood;
     at_s: when it came last, s; sent: where and what each of its frames has written; is_let_go: somebody on that host has
-    written enable as 0 since."""
+    written enable as 0 since; is_moving: one of its frames that were refused has brought another heartbeat last."""
 
     frame: StartFrame
     heartbeat: int
@@ -63,16 +64,17 @@ class _Refused(NamedTuple):
     at_s: float
     sent: Mapping[Channel, tuple[int, bytes]]
     is_let_go: bool = False
+    is_moving: bool = False
 
     def is_same(self, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new. Of who beats one without a heartbeat does not: the one that stands may be
         another's. Who is refused because another one owns is told to take over."""
         if self.is_let_go:
-            return self.sent.get(frame.channel) == frame.data
+            return frame.data in self.sent.values()
         if frame.takes and not self.frame.takes:
             return False
         if frame.heartbeat is None and self.beats:
-            return True
+            return not self.is_moving
         return frame.heartbeat == self.heartbeat or frame.data == self.frame.data
 
 
@@ -107,7 +109,7 @@ class LastTares:
         if self._frames.note(channel, heartbeat) and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
             self.let_go(host)
 
-    def let_go(self, host: str) -> None:
+    def let_go(self, host: str, now_s: float = 0.0) -> None:
         """Note that a host has written the bit as 0."""
         self._last.pop(host, None)
 
@@ -123,9 +125,11 @@ class HeldEnables:
         self.on_change: Callable[[dict[str, float]], None] = lambda held: None
         self.on_lost: Callable[[dict[str, list[int]]], None] = lambda lost: None
         self.beats_of: Callable[[str | None], Sequence[int]] = lambda host: ()
+        self.on_refused_beat: Callable[[float, int, str, Channel], None] = lambda now_s, heartbeat, host, channel: None
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, list[int]] = {}
         self._lost_now: dict[str, list[int]] = {}
+        self._let_go_s: dict[str, float] = {}  # when somebody on the host of one of the lost has written enable as 0
         self._frames = FrameBeats()
         self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
@@ -156,6 +160,7 @@ class HeldEnables:
         that stands."""
         if not self._has_lease:
             return
+        is_moving = self._moves(host, frame)
         before = self._refused.pop(host, None)
         if before and self._is_same(before, frame):
             frame = frame._replace(takes=frame.takes or before.frame.takes)  # one of its frames does
@@ -164,10 +169,15 @@ class HeldEnables:
         beats = frame.heartbeat is not None
         if frame.heartbeat is not None:
             self._frames.note(frame.channel, frame.heartbeat)
+        moving = is_moving if beats else bool(before and before.is_moving)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
         sent = {**(before.sent if before else {}), frame.channel: frame.data}
         few = dict(list(sent.items())[-defaults.MOST_FRAMES :])
-        keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s, few))
+        keep_latest(
+            self._refused,
+            host,
+            _Refused(frame, known, beats or bool(before and before.beats), now_s, few, is_moving=moving),
+        )
 
     def _is_same(self, refused: _Refused, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new, beside what was refused last or behind itself."""
@@ -176,20 +186,40 @@ class HeldEnables:
             is_as_before and not refused.is_let_go and (refused.frame.takes or not frame.takes)
         )
 
+    def follow(self, channel: Channel, heartbeat: int) -> None:
+        """Note what a frame brings, of whichever host: what it brought before is asked for when its host is refused or lost."""
+        if channel != NO_BEAT:
+            self._frames.note(channel, heartbeat)
+
+    def has_beaten(self, host: str) -> bool:
+        """Decide whether a host has written a heartbeat: a person writes none."""
+        return bool(self._frames.of(host))
+
     def note_refused_beat(self, host: str, frame: StartFrame) -> None:
         """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""
-        heartbeat = frame.heartbeat
-        if heartbeat is None or not self._frames.note(frame.channel, heartbeat):
+        heartbeat, is_moving = frame.heartbeat, self._moves(host, frame)
+        if heartbeat is None:
             return
-        if refused := self._refused.get(host):
-            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
+        is_new, refused = self._frames.note(frame.channel, heartbeat), self._refused.get(host)
+        if refused is not None:
+            known, beats = (heartbeat, True) if is_new else (refused.heartbeat, refused.beats)
+            self._refused[host] = refused._replace(heartbeat=known, beats=beats, is_moving=is_moving)
+
+    def _moves(self, host: str, frame: StartFrame) -> bool:
+        """Whether a frame that was refused has brought another heartbeat than before: its program goes on."""
+        if frame.heartbeat is None:
+            return False
+        self._look_for(host, frame.heartbeat, frame.channel)
+        return self._frames.moves(frame.channel, frame.heartbeat)
 
     def repeats(self, host: str, frame: StartFrame, now_s: float) -> bool:
         """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
         was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
         is over."""
-        if host in self.lost and (frame.heartbeat is None or frame.heartbeat in self.lost[host]):
-            return True
+        if host in self.lost and (frame.heartbeat is None or not self._is_there(host, frame.heartbeat, frame.channel)):
+            if now_s - self._let_go_s.get(host, inf) < _CYCLE_S:
+                return True
+            self._find(host)
         if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
             return False
         if now_s - refused.at_s >= (_CYCLE_S if refused.is_let_go else _HELD_S):
@@ -214,20 +244,33 @@ class HeldEnables:
 
     def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
+        self._look_for(host, heartbeat, channel)
         is_new = self._frames.note(channel, heartbeat)
-        if is_new and host in self._lost_now and heartbeat not in self._lost_now[host]:
-            self._find(host)
         if (refused := self._refused.get(host)) is None:
             return
-        if refused.heartbeat == heartbeat:
-            self._refused[host] = refused._replace(beats=True)
-        elif is_new:
+        if refused.heartbeat == heartbeat or not is_new:
+            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True, is_moving=False)
+        else:
             del self._refused[host]
 
-    def let_go(self, host: str) -> None:
+    def _is_there(self, host: str, heartbeat: int, channel: Channel) -> bool:
+        """Whether the program of a lost master goes on: a heartbeat that only goes to and fro may have been in one of its
+        frames each way."""
+        if self._frames.knows(channel) and self._frames.has_changed(channel, heartbeat):
+            return True
+        lost = (*self.lost.get(host, ()), *self._lost_now.get(host, ()))
+        return heartbeat not in lost and not self._frames.has_brought(channel, heartbeat)
+
+    def _look_for(self, host: str, heartbeat: int, channel: Channel) -> None:
+        if (host in self.lost or host in self._lost_now) and self._is_there(host, heartbeat, channel):
+            self._find(host)
+
+    def let_go(self, host: str, now_s: float = -inf) -> None:
         """Note that a host has written enable as 0. What was refused, and comes again as soon as only a cycle does, is of a
         program beside the one that wrote this."""
-        self._find(host)
+        if host in self.lost:
+            self._let_go_s[host] = now_s
+        self._miss_no_more(host)
         self._forget(host)
         if refused := self._refused.get(host):
             self._refused[host] = refused._replace(is_let_go=True)
@@ -235,6 +278,10 @@ class HeldEnables:
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""
         self.lost.pop(host, None)
+        self._let_go_s.pop(host, None)
+        self._miss_no_more(host)
+
+    def _miss_no_more(self, host: str) -> None:
         if self._lost_now.pop(host, None) is not None:
             self.on_lost(dict(self._lost_now))
 

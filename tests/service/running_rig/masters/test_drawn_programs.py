@@ -1,0 +1,141 @@
+"""Programs on one or two hosts, as a seed draws them: what hangs presses nothing anew, and no other is refused for long."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from gateway.modbus import Peer
+from gateway.registers import Refusal
+from gateway.registers.words import State
+from gateway.service.running_rig.handover import Handover
+from tests.control.bench import settings
+from tests.service.running_rig.masters.drawn_scene import LEASE_S, Scene
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, RESET, TAKE, TARE, SmallRig
+
+SEEDS, STEPS, CYCLE_S = (7, 44, 171, 200), 20, 0.05
+PAGE, TWIN = Peer("web"), Peer(OTHER.host, OTHER.port + 1)
+
+
+@pytest.mark.parametrize("first", SEEDS)
+def test_what_hangs_begins_nothing_and_what_goes_on_has_its_force(first: int, budget: int) -> None:
+    for seed in (first, *range(1000 * first, 1000 * first + 10 * (budget - 1))):
+        scene = Scene(seed)
+        scene.play(STEPS)
+        assert scene.rig.trace
+
+
+def begun(kept: dict[str, Any] | None = None) -> SmallRig:
+    rig, facts = SmallRig(settings(lease_s=LEASE_S)), {} if kept is None else kept
+    Handover(dict(facts), record=False).restore_held(rig.bank, rig.now(), lambda **told: facts.update(told))
+    rig.beats = False
+    return rig.run(0.5)
+
+
+def flow(rig: SmallRig, cycles: int, *frames: Callable[[int], Refusal | None]) -> list[list[Refusal | None]]:
+    """Each cycle's answers. frames: told the number of the cycle."""
+    answers = []
+    for cycle in range(cycles):
+        answers.append([frame(cycle) for frame in frames])
+        rig.run(CYCLE_S)
+    return answers
+
+
+def test_behind_a_death_a_heartbeat_that_only_goes_to_and_fro_is_a_sign_of_life() -> None:
+    """Its frames had brought both values when its master was lost: it was refused until it wrote 0, whatever it wrote else."""
+    rig = begun({"lost_beats": {OWNER.host: [0, 1]}})
+    answers = flow(rig, 6, lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle % 2))
+    assert answers[0][0] and rig.state in (State.RAMPING, State.HOLDING)
+
+
+def test_beside_a_program_that_writes_one_of_its_two_values_a_master_that_toggles_begins_behind_a_stop() -> None:
+    rig = begun()
+    flow(rig, 4, lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle % 2))
+    rig.write(0, 0, peer=OTHER)
+    flow(rig, 4, lambda _: rig.answer(4, 0, peer=OTHER), lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle % 2))
+    assert rig.state in (State.RAMPING, State.HOLDING)
+
+
+@pytest.mark.parametrize("has_died", [False, True])
+def test_a_master_takes_over_whose_heartbeat_comes_in_a_frame_that_is_refused_beside_the_owner(has_died: bool) -> None:
+    """Its word without a heartbeat was refused for its last one, and the frame with its heartbeat for the owner, for good."""
+    rig = begun({"lost_beats": {OTHER.host: [7]}} if has_died else None)
+    if not has_died:
+        rig.write(0, ENABLE | TAKE, 1200, 0, 0, 7, peer=OTHER)
+    rig.write(0, ENABLE | TAKE, 800, 0, 0, 1)
+    flow(
+        rig,
+        5,
+        lambda cycle: rig.answer(4, 2 + cycle),
+        lambda cycle: rig.answer(1, 1200, 0, 0, 8 + cycle, peer=OTHER),
+        lambda _: rig.answer(0, ENABLE | TAKE, peer=OTHER),
+    )
+    assert rig.bank.owner == OTHER.host
+
+
+def test_a_fault_is_reset_by_a_master_whose_heartbeat_is_refused_beside_an_owner() -> None:
+    rig = SmallRig(settings(lease_s=LEASE_S)).faulted()
+    rig.write(1, 500, peer=PAGE)
+    flow(
+        rig,
+        5,
+        lambda cycle: rig.answer(1, 0, 0, 0, 50 + cycle, peer=OTHER),
+        lambda _: rig.answer(0, RESET | TAKE, peer=OTHER) if rig.state is State.FAULT else None,
+    )
+    assert rig.state is State.OFF
+
+
+def test_the_0_of_a_block_counts_that_is_refused_beside_an_owner() -> None:
+    """It was told to write enable as 0 once, did so, and was told so again, for as long as another one owned."""
+    rig = SmallRig(settings(lease_s=LEASE_S)).faulted()
+    rig.beats = False
+    assert rig.answer(0, ENABLE, 1200, 0, 0, 1, peer=OTHER)
+    rig.write(0, RESET, 0, 0, 0, 4711, peer=PAGE)
+    rig.write(1, 500, peer=PAGE)
+    assert rig.answer(0, ENABLE | TAKE, 1200, 0, 0, 2, peer=OTHER)
+    rig.answer(0, 0, 0, 0, 0, 3, peer=OTHER)
+    assert rig.answer(0, ENABLE | TAKE, 1200, 0, 0, 4, peer=OTHER) is None
+
+
+def test_of_two_programs_that_hung_on_one_host_one_does_not_press_behind_the_other_s_0() -> None:
+    """Each 0 came before the lease was over, so that no master was lost: the other one's frame enabled anew, on and on."""
+    rig = begun()
+    rig.write(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    flow(
+        rig,
+        40,
+        lambda _: rig.answer(0, 0, peer=TWIN),
+        lambda _: rig.answer(0, ENABLE, peer=OTHER),
+        lambda _: rig.answer(1, 1200, 0, 0, 7, peer=OTHER),
+    )
+    assert rig.state is State.OFF
+
+
+def test_behind_a_death_a_0_beside_a_hung_program_lets_its_frame_not_begin() -> None:
+    rig = begun({"lost_beats": {OTHER.host: [7]}})
+    answers = flow(
+        rig, 40, lambda _: rig.answer(0, 0, peer=TWIN), lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    )
+    assert all(refused for _, refused in answers)
+
+
+def test_behind_a_0_the_frame_of_a_hung_program_that_connects_anew_is_known() -> None:
+    rig = begun()
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    frames = (Peer(OTHER.host, 6000 + k) for k in range(100))
+    flow(rig, 5, lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 7, peer=next(frames)))
+    rig.write(0, 0, peer=TWIN)
+    rig.is_cell_silent = False
+    rig.run(0.2)
+    answers = flow(rig, 20, lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 7, peer=next(frames)))
+    assert all(refused for (refused,) in answers)
+
+
+def test_a_tare_of_a_program_that_hung_is_taken_by_no_process_behind_it() -> None:
+    kept: dict[str, Any] = {}
+    rig = begun(kept)
+    assert rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER) is None
+    rig = begun(kept)
+    answers = flow(rig, 5, lambda _: rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER))
+    assert all(refused for (refused,) in answers)
