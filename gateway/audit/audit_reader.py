@@ -54,7 +54,12 @@ def verify_audit(state: Path) -> AuditVerdict:
     walk = _ChainWalk(head)
     try:
         for path in files:
-            walk.read(path, is_last=path == files[-1])
+            try:
+                walk.read(path, is_last=path == files[-1])
+            except BrokenLine as broken:
+                if not walk.may_be_unsynced or path != files[-1]:
+                    raise
+                walk.note_unsynced(broken)
         walk.check_ends(files[0].name if files else AUDIT)
     except BrokenLine as broken:
         return AuditVerdict(walk.count, walk.end, AuditBreak(walk.file, walk.line, str(broken)), tuple(walk.notes))
@@ -84,6 +89,16 @@ class _ChainWalk:
                 self.notes.append(f"{path.name} ends in an incomplete line ({line.length} bytes): {cause}")
             else:
                 raise BrokenLine("is incomplete, and a file follows")
+
+    @property
+    def may_be_unsynced(self) -> bool:
+        """Decide whether what is read now stands behind all that was synced: the head's line has been met."""
+        return self._is_head_met
+
+    def note_unsynced(self, broken: BrokenLine) -> None:
+        """Note that the chain ends behind the head, and something follows."""
+        cause = "a power cut took what was not synced, or it is being written; a start cuts it off"
+        self.notes.append(f"{self.file} line {self.line} {broken}: it stands behind the head: {cause}")
 
     def check_ends(self, first_file: str) -> None:
         """Check that nothing is missing before the first line that is kept, and after the last."""

@@ -211,9 +211,9 @@ def _check_codec(profile: DeviceProfile) -> None:
             raise ProfileMisfit((name,), f"{name} of codec {profile.codec} {wanted}")
     if not (profile.is_modbus or profile.is_raw):
         if not profile.terminator:
-            raise ValueError('terminator is missing: what ends a line, such as "\\r\\n"')
+            raise ProfileMisfit(("terminator", *_EXCHANGES), 'terminator is missing: a line\'s end such as "\\r\\n"')
         if not f"{profile.terminator}{profile.question_terminator or ''}".isascii():
-            raise ValueError("terminator and question_terminator are ASCII text")
+            raise ProfileMisfit(("terminator",), "terminator and question_terminator are ASCII text")
         return
     if profile.terminator or profile.question_terminator or profile.checksum != "none" or profile.read_over:
         sentence = "a frame of Modbus RTU or of raw bytes has its own end: leave terminator, checksum and read_over out"

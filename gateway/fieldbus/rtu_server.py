@@ -159,6 +159,8 @@ class ModbusRtuServer:
             self.note_standstill()
         if self.port:  # what came while this process was late goes on with what is waiting here
             self.port.read_arrived()
+        else:
+            self._open_pty.read_arrived(max(0.0, monotonic_s() - self._due_s))
         requests = self._receiver.take(monotonic_s())
         if requests:  # nobody waits for the answer to a broadcast: one may have another request right behind it
             most = 2 if any(request.unit == BROADCAST_UNIT for request in requests) else 1

@@ -59,6 +59,13 @@ class PacedPty:
             return
         self._outward.put(resample_at_baud(data, self._baud, self._open_pty.client_baud()), at_s)
 
+    def read_arrived(self, late_s: float) -> None:
+        """Hand over what would be through the wire, had it come so long ago: a loop that was late by that reads it now, and may
+        have called another timer first."""
+        if self._pty:
+            self._on_readable()
+            self._inward.hand_over(late_s)
+
     @property
     def backlog_s(self) -> float:
         """Time until everything sent is through the wire."""
@@ -124,6 +131,11 @@ class _Flow:
         if last_s is not None:
             delay_s = min(_LONGEST_PIECE_S, max(_SHORTEST_WAIT_S, last_s - monotonic_s()))
             self._timer = asyncio.get_running_loop().call_later(delay_s, self._on_time)
+
+    def hand_over(self, late_s: float) -> None:
+        now_s = monotonic_s()
+        if data := self.wire.bytes_through(now_s + late_s):
+            self._take(data, now_s)
 
     def _on_time(self) -> None:
         self._timer = None

@@ -133,6 +133,8 @@ def read_named(kind: str, reference: ProfileReference | None, read: Read[T], fin
         return None
     value, faults = read(opened[0])
     findings.faults += faults
+    if kind == "device":  # its texts are a device's words, in which a `#` may be one
+        findings.warnings += opened[0].warn_of_glued_comments()
     return value
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from gateway.audit.audit_file import AuditFile
+from tests.audit.appending import append
 from tests.audit.test_chain import FILE_BYTES, LINES, records
 
 
@@ -12,6 +13,6 @@ from tests.audit.test_chain import FILE_BYTES, LINES, records
 def state(tmp_path: Path) -> Path:
     file = AuditFile(tmp_path, FILE_BYTES)
     for record in records(LINES):
-        file.append([record])
+        append(file, [record])
     file.close()
     return tmp_path

@@ -10,23 +10,33 @@ from typing import Any
 import pytest
 
 from gateway.audit import audit_log as audit_log_module
-from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_file import AuditFile, Place, Written
 from gateway.audit.audit_log import MOST_WAITING, AuditLog
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.processes.event import utc_text
+from tests.audit.appending import append
 
 
 class FailingFile:
-    """Takes records while `is_full` is not set."""
+    """Takes records while `is_full` is not set, and syncs while `is_broken` is not."""
 
     def __init__(self) -> None:
-        self.is_full = self.is_closed = False
+        self.is_full = self.is_broken = self.is_closed = False
         self.taken: list[dict[str, Any]] = []
+        self.synced = 0
 
-    def append(self, records: Iterable[dict[str, Any]]) -> None:
+    def write(self, records: Iterable[dict[str, Any]], *, again: bool = False) -> Written:
+        if again:
+            del self.taken[self.synced :]
         if self.is_full:
             raise OSError(errno.ENOSPC, "No space left on device")
         self.taken.extend(records)
+        return Written(Place(len(self.taken)))
+
+    def sync(self, place: Place) -> None:
+        if self.is_broken:
+            raise OSError(errno.EIO, "Input/output error")
+        self.synced = place.size
 
     def close(self) -> None:
         self.is_closed = True
@@ -42,7 +52,7 @@ def audit_log(file: Any, said: list[str], now: Callable[[], float]) -> AuditLog:
             result = error
         done(result)
 
-    log.run_in_background = at_once
+    log.run_in_background = log.sync_in_background = at_once
     return log
 
 
@@ -98,7 +108,7 @@ def test_what_a_full_disk_kept_back_is_written_at_the_end_where_it_is_free_again
             except OSError as error:
                 at_once(0.01, done, error)
 
-        log.run_in_background = later
+        log.run_in_background = log.sync_in_background = later
         file.is_full = True
         log.put({"k": 1})
         log.flush()
@@ -130,14 +140,14 @@ def test_a_disk_that_hangs_at_the_end_keeps_the_file_that_is_being_written(monke
 
 def test_a_write_that_fails_halfway_leaves_the_chain_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = AuditFile(tmp_path)
-    file.append([{"what": "enable"}])
+    append(file, [{"what": "enable"}])
     monkeypatch.setattr(
         "gateway.audit.audit_file.os.fsync", lambda descriptor: (_ for _ in ()).throw(OSError(28, "full"))
     )
     with pytest.raises(OSError, match="full"):
-        file.append([{"what": "disable"}])
+        append(file, [{"what": "disable"}])
     monkeypatch.undo()
-    file.append([{"what": "disable"}])
+    append(file, [{"what": "disable"}])
     file.close()
     assert [record["what"] for record in read_audit(tmp_path)] == ["enable", "disable"]
     assert not verify_audit(tmp_path).broken
@@ -171,25 +181,28 @@ def test_each_record_is_written_once_in_its_order_or_counted_as_lost(
     rng, file, now, refused_s = random.Random(seed), FailingFile(), [0.0], -10.0
     log = audit_log(file, [], lambda: now[0])
     under_way: list[tuple[Callable[[], Any], Callable[[Any], None]]] = []
+    syncing: list[tuple[Callable[[], Any], Callable[[Any], None]]] = []
     log.run_in_background = lambda work, done: under_way.append((work, done))
+    log.sync_in_background = lambda work, done: syncing.append((work, done))
     put_s: list[float] = []
-    for turn in range(80):
+    for turn in range(84):
         now[0] += rng.choice((0.1, 1.0, 6.0)) if turn < 78 else 6.0
-        for _ in range(rng.randrange(5)):
+        for _ in range(rng.randrange(5) if turn < 78 else 0):
             log.put({"k": len(put_s)})
             put_s.append(now[0])
         was_idle = not under_way
         log.flush()
         assert not (was_idle and under_way) or now[0] >= refused_s + 5.0
-        assert len(log._waiting) <= 5
-        if under_way and (turn >= 78 or rng.random() < 0.6):
-            work, done = under_way.pop()
-            try:
-                file.is_full = turn < 78 and rng.random() < 0.6
-                done(work())
-            except OSError as error:
-                refused_s = now[0]
-                done(error)
+        assert len(log._waiting) <= 5 and len(log._written) < 11
+        for queue in rng.sample((under_way, syncing), 2):
+            if queue and (turn >= 78 or rng.random() < 0.6):
+                work, done = queue.pop()
+                try:
+                    file.is_full = file.is_broken = turn < 78 and rng.random() < 0.6
+                    done(work())
+                except OSError as error:
+                    refused_s = now[0]
+                    done(error)
     written = [record["k"] for record in file.taken if "k" in record]
     assert written == sorted(set(written))
     missing = iter([k for k in range(len(put_s)) if k not in written])

@@ -17,6 +17,7 @@ from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.chain import ChainEnd, open_line, seal_line
 from gateway.cli.main import command
+from tests.audit.appending import append
 
 LINES = 14
 FILE_BYTES = 1200  # so that the lines are in several files
@@ -104,7 +105,7 @@ def test_a_line_cut_anywhere_is_told_apart_from_tampering_and_the_chain_goes_on(
     path = files_of(state)[-1]
     before, head = path.read_bytes(), (state / "audit" / "head").read_bytes()
     file = AuditFile(state, 1 << 20)
-    file.append([{"what": "enable"}])
+    append(file, [{"what": "enable"}])
     file.close()
     written = path.read_bytes()
     for cut in range(len(before) + 1, len(written), 7):
@@ -113,7 +114,7 @@ def test_a_line_cut_anywhere_is_told_apart_from_tampering_and_the_chain_goes_on(
         verdict = verify_audit(state)
         assert not verdict.broken and "incomplete line" in verdict.notes[0]
         file = AuditFile(state, 1 << 20)
-        file.append([{"what": "disable"}])
+        append(file, [{"what": "disable"}])
         file.close()
         assert not verify_audit(state).broken
         last_two = [record["what"] for record in read_audit(state)][-2:]
@@ -125,7 +126,7 @@ def test_half_a_line_that_a_full_disk_took_and_kept_is_gone_before_the_next(
     state: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file, write, room = AuditFile(state, 10 * FILE_BYTES), os.write, [20]
-    file.append(records(1, 15))
+    append(file, records(1, 15))
 
     def fill(descriptor: int, data: bytes) -> int:
         if not room:
@@ -139,8 +140,8 @@ def test_half_a_line_that_a_full_disk_took_and_kept_is_gone_before_the_next(
         full.setattr(os, "write", fill)
         full.setattr(os, "ftruncate", refuse)
         with pytest.raises(OSError, match="full"):
-            file.append(records(1, 16))
-    file.append(records(1, 16))
+            append(file, records(1, 16))
+    append(file, records(1, 16))
     file.close()
     assert (verify_audit(state).broken, verify_audit(state).end.number) == (None, 16)
 
@@ -150,7 +151,7 @@ def test_lines_cut_off_at_the_end_are_tampering_and_a_new_start_hides_nothing(st
     path.write_bytes(b"".join(lines[:place]))
     assert "the end was removed" in verify_audit(state).broken.text  # type: ignore[union-attr]
     file = AuditFile(state, 1 << 20)
-    file.append([{"what": "enable"}])
+    append(file, [{"what": "enable"}])
     file.close()
     assert verify_audit(state).broken
     assert any(str(record.get("text", "")).startswith("A352 ") for record in read_audit(state))
@@ -159,7 +160,7 @@ def test_lines_cut_off_at_the_end_are_tampering_and_a_new_start_hides_nothing(st
 def test_old_files_go_and_the_chain_says_so(tmp_path: Path) -> None:
     file = AuditFile(tmp_path, FILE_BYTES, kept=3)
     for record in records(40):
-        file.append([record])
+        append(file, [record])
     file.close()
     verdict = verify_audit(tmp_path)
     assert len(files_of(tmp_path)) == 3 and not verdict.broken
@@ -181,11 +182,11 @@ def test_an_old_file_stays_until_the_line_that_says_so_is_on_the_disk(
 
     monkeypatch.setattr("gateway.audit.audit_file.os.write", refuse)
     for record in records(20):
-        file.append([record])
+        append(file, [record])
     assert len(files_of(tmp_path)) > 3 and verify_audit(tmp_path).broken is None
     monkeypatch.undo()
     for record in records(20, 21):
-        file.append([record])
+        append(file, [record])
     file.close()
     assert len(files_of(tmp_path)) == 3 and verify_audit(tmp_path).broken is None
 
@@ -193,11 +194,11 @@ def test_an_old_file_stays_until_the_line_that_says_so_is_on_the_disk(
 def test_a_full_audit_with_an_altered_old_file_goes_on_and_keeps_it(tmp_path: Path) -> None:
     file = AuditFile(tmp_path, FILE_BYTES, kept=3)
     for record in records(LINES):
-        file.append([record])
+        append(file, [record])
     oldest = files_of(tmp_path)[0]
     oldest.write_bytes(oldest.read_bytes()[:-5] + b"\n")
     for record in records(30):
-        file.append([record])
+        append(file, [record])
     file.close()
     assert oldest.exists()
     assert len(list(read_audit(tmp_path))) >= 8
@@ -212,7 +213,7 @@ def test_a_line_with_a_good_hash_that_says_nothing_is_a_break_and_no_crash(tmp_p
     (tmp_path / "audit" / "000000000001.jsonl").write_bytes(body + b', "sha256": "' + own + b'"}\n')
     assert verify_audit(tmp_path).broken
     file = AuditFile(tmp_path)
-    file.append(records(1))
+    append(file, records(1))
     file.close()
     assert [record for record in read_audit(tmp_path) if record.get("old") == 1]
 
@@ -221,7 +222,9 @@ def test_a_writer_that_is_killed_leaves_a_chain(tmp_path: Path) -> None:
     program = (
         "import sys; from pathlib import Path; from gateway.audit.audit_file import AuditFile\n"
         "file = AuditFile(Path(sys.argv[1]), 2000)\n"
-        "for k in range(100000):\n    file.append([{'what': 'force_setpoint', 'new': k}])\n    print(k, flush=True)\n"
+        "for k in range(100000):\n    record = [{'what': 'force_setpoint', 'new': k}]\n"
+        "    if not (written := file.write(record)):\n        file.sync(place)\n        written = file.write(record)\n"
+        "    place = written.place\n    print(k, flush=True)\n"
     )
     writer = subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], stdout=subprocess.PIPE, text=True)
     assert writer.stdout

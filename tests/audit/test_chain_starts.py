@@ -12,6 +12,7 @@ import pytest
 from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.chain import NO_HASH
+from tests.audit.appending import append
 from tests.audit.test_chain import FILE_BYTES, LINES, files_of, find_line, records, replace_last_line
 from tests.other_kinds import MAKERS, never_waiting, put
 
@@ -27,7 +28,7 @@ def test_a_start_covers_up_no_head_that_is_gone_or_names_another_line(state: Pat
         (state / "audit" / "head").unlink()
     for _ in range(2):
         file = AuditFile(state, 1 << 20)
-        file.append([{"what": "start"}])
+        append(file, [{"what": "start"}])
         file.close()
     told = [fields["text"] for fields in read_audit(state) if fields["what"] == "chain broken"]
     assert [text[:4] for text in told] == ["A352"]
@@ -38,7 +39,7 @@ def test_behind_a_last_line_that_was_altered_the_numbers_go_on_and_no_hash_vouch
     newest = audit_files(state / "audit")[-1]
     newest.write_bytes(newest.read_bytes()[:-20] + b"0" * 19 + b"\n")
     file = AuditFile(state, 1 << 20)
-    file.append([{"what": "start"}])
+    append(file, [{"what": "start"}])
     file.close()
     behind = [json.loads(line) for line in newest.read_bytes().splitlines()[-2:]]
     assert [(each["n"], each["what"]) for each in behind] == [(LINES + 1, "chain broken"), (LINES + 2, "start")]
@@ -49,7 +50,7 @@ def test_a_head_that_is_damaged_alone_is_no_line_that_was_replaced(state: Path) 
     """The line of the next start continues none, and says why."""
     (state / "audit" / "head").write_text("{")
     file = AuditFile(state, 1 << 20)
-    file.append([{"what": "start"}])
+    append(file, [{"what": "start"}])
     file.close()
     broken = verify_audit(state).broken
     assert broken and broken.line and "no head that can be read" in broken.text and "replaced" not in broken.text
@@ -65,9 +66,9 @@ def test_no_audit_waits_for_what_is_no_file(state: Path, name: str, kind: str) -
     with never_waiting():
         if name == "newest":
             with pytest.raises(OSError, match=f"it is {kind}"):
-                file.append([{"what": "start"}])
+                append(file, [{"what": "start"}])
         else:
-            file.append([{"what": "start"}])  # an old head promises less than there is
+            append(file, [{"what": "start"}])  # an old head promises less than there is
     file.close()
 
 
@@ -89,9 +90,9 @@ def test_what_the_disk_does_not_give_now_is_neither_gone_nor_altered(
         for call in ("open", "listdir", "scandir"):  # a folder is read by the one, or from Python 3.13 on by the other
             patched.setattr(os, call, refusing(getattr(os, call)))
         with pytest.raises(PermissionError):
-            AuditFile(state, FILE_BYTES).append([{"what": "start"}])
+            append(AuditFile(state, FILE_BYTES), [{"what": "start"}])
     file = AuditFile(state, FILE_BYTES)
-    assert file.append([{"what": "start"}]) == ()
+    assert append(file, [{"what": "start"}]) == ()
     file.close()
     assert not verify_audit(state).broken
 
@@ -100,7 +101,7 @@ def test_a_writer_killed_between_a_new_file_and_its_first_line_leaves_the_chain_
     """The end of the chain is in the file before then."""
     (state / "audit" / f"{LINES + 1:012d}.jsonl").touch()
     file = AuditFile(state, FILE_BYTES)
-    assert file.append(records(1, LINES + 1)) == ()
+    assert append(file, records(1, LINES + 1)) == ()
     file.close()
     verdict = verify_audit(state)
     assert (verdict.broken, verdict.end.number) == (None, LINES + 1)
@@ -111,7 +112,7 @@ def test_of_a_long_torn_line_the_beginning_is_quoted(state: Path) -> None:
     with files_of(state)[-1].open("ab") as stream:
         stream.write(b"x" * (1 << 20))
     file = AuditFile(state, 1 << 24)
-    file.append([{"what": "enable"}])
+    append(file, [{"what": "enable"}])
     file.close()
     torn = next(record for record in read_audit(state) if record["what"] == "torn line")
     assert torn["torn"] == 400 * "x" and str(1 << 20) in torn["text"] and not verify_audit(state).broken
@@ -119,7 +120,7 @@ def test_of_a_long_torn_line_the_beginning_is_quoted(state: Path) -> None:
 
 def test_a_writer_that_is_closed_twice_closes_nobody_else_s_file(tmp_path: Path) -> None:
     file = AuditFile(tmp_path)
-    file.append(records(1))
+    append(file, records(1))
     file.close()
     with (tmp_path / "other").open("wb") as other:  # the number is given again
         file.close()
@@ -129,12 +130,12 @@ def test_a_writer_that_is_closed_twice_closes_nobody_else_s_file(tmp_path: Path)
 @pytest.mark.parametrize("removed", [1, 2, 5])
 def test_lines_removed_at_the_end_are_told_at_the_next_start_once(tmp_path: Path, removed: int) -> None:
     file = AuditFile(tmp_path)
-    file.append(records(LINES))
+    append(file, records(LINES))
     file.close()
     path, lines, _ = find_line(tmp_path, 0)
     path.write_bytes(b"".join(lines[:-removed]))
     file = AuditFile(tmp_path)
-    told = [file.append(records(1, LINES + k)) for k in range(3)]
+    told = [append(file, records(1, LINES + k)) for k in range(3)]
     file.close()
     assert [len(each) for each in told] == [1, 0, 0]
     assert told[0][0].startswith("A352 ") and "lines at its end were removed" in told[0][0]
@@ -146,7 +147,7 @@ def test_a_next_file_that_the_disk_refuses_costs_no_line_and_doubles_none(
 ) -> None:
     """What was written is written: a batch that is called failed would be put down again."""
     file, real_open = AuditFile(tmp_path, FILE_BYTES), os.open
-    file.append(records(1))
+    append(file, records(1))
 
     def refuse(path: Any, flags: int, *more: Any, **others: Any) -> int:
         if flags & os.O_APPEND:
@@ -156,8 +157,8 @@ def test_a_next_file_that_the_disk_refuses_costs_no_line_and_doubles_none(
     with monkeypatch.context() as full:
         full.setattr(os, "open", refuse)
         for record in records(LINES, 2):
-            file.append([record])
-    file.append(records(1, LINES + 2))
+            append(file, [record])
+    append(file, records(1, LINES + 2))
     file.close()
     assert [record["old"] for record in read_audit(tmp_path)] == list(range(1, LINES + 3))
     assert not verify_audit(tmp_path).broken
@@ -173,7 +174,7 @@ def test_a_start_behind_files_that_a_broken_disk_has_emptied_goes_on_behind_the_
     for path in (last, newest):
         path.write_bytes(b"")
     file = AuditFile(state, 1 << 20)
-    assert [text[:4] for text in file.append([{"what": "start"}])] == ["A352"]
+    assert [text[:4] for text in append(file, [{"what": "start"}])] == ["A352"]
     file.close()
     told = [fields for fields in read_audit(state) if fields["n"] > end]
     assert [each["what"] for each in told] == ["chain broken", "start"]

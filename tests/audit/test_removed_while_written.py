@@ -11,6 +11,7 @@ import pytest
 from gateway.audit import audit_file
 from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.audit_reader import read_audit, verify_audit
+from tests.audit.appending import append
 
 
 def newest(state: Path) -> Path:
@@ -41,7 +42,7 @@ def edit_file(state: Path) -> None:
 @pytest.fixture
 def written(tmp_path: Path) -> AuditFile:
     file = AuditFile(tmp_path, 1 << 20)
-    file.append([{"what": "start"}, {"what": "force_setpoint", "old": 1}])
+    append(file, [{"what": "start"}, {"what": "force_setpoint", "old": 1}])
     return file
 
 
@@ -53,15 +54,15 @@ def whats(state: Path) -> list[str]:
 def test_what_is_written_later_is_found(tmp_path: Path, written: AuditFile, how: Callable[[Path], None]) -> None:
     """Until its next start the gateway wrote into a file that nobody could open any more, and told nobody."""
     how(tmp_path)
-    (told,) = written.append([{"what": "enable"}])
+    (told,) = append(written, [{"what": "enable"}])
     assert told.startswith("A352") and "up to 2 " in told
     assert whats(tmp_path)[-2:] == ["chain broken", "enable"]
-    assert written.append([{"what": "disable"}]) == ()
+    assert append(written, [{"what": "disable"}]) == ()
     written.close()
     verdict = verify_audit(tmp_path)
     assert verdict.broken, "what is gone does not look as if it had never been"
     again = AuditFile(tmp_path, 1 << 20)
-    assert again.append([{"what": "start"}]) == (), "and the next start finds the end as it was left"
+    assert append(again, [{"what": "start"}]) == (), "and the next start finds the end as it was left"
     again.close()
     assert whats(tmp_path)[-3:] == ["enable", "disable", "start"]
 
@@ -69,7 +70,7 @@ def test_what_is_written_later_is_found(tmp_path: Path, written: AuditFile, how:
 def test_nothing_that_moves_the_file_back_is_an_alteration(tmp_path: Path, written: AuditFile) -> None:
     newest(tmp_path).rename(tmp_path / "aside")
     (tmp_path / "aside").rename(tmp_path / "audit" / "000000000001.jsonl")
-    assert written.append([{"what": "enable"}]) == ()
+    assert append(written, [{"what": "enable"}]) == ()
     written.close()
     assert verify_audit(tmp_path).broken is None
 
@@ -85,8 +86,8 @@ def test_a_disk_that_refuses_meanwhile_hides_nothing(
         patched.setattr(audit_file.os, "fsync", refuse)
         for _ in range(2):
             with pytest.raises(OSError, match="No space"):
-                written.append([{"what": "enable"}])
-    (told,) = written.append([{"what": "enable"}])
+                append(written, [{"what": "enable"}])
+    (told,) = append(written, [{"what": "enable"}])
     written.close()
     assert told.startswith("A352") and whats(tmp_path) == ["chain broken", "enable"]
 
@@ -95,13 +96,13 @@ def test_a_state_directory_that_was_moved_away_is_not_begun_anew(tmp_path: Path)
     """Whoever moved it may want to move it back."""
     state = tmp_path / "state"
     file = AuditFile(state, 1 << 20)
-    file.append([{"what": "start"}])
+    append(file, [{"what": "start"}])
     state.rename(tmp_path / "elsewhere")
     with pytest.raises(FileNotFoundError):
-        file.append([{"what": "enable"}])
+        append(file, [{"what": "enable"}])
     assert not state.exists()
     (tmp_path / "elsewhere").rename(state)
-    assert file.append([{"what": "enable"}]) == ()
+    assert append(file, [{"what": "enable"}]) == ()
     file.close()
     assert whats(state) == ["start", "enable"]
 
@@ -114,8 +115,8 @@ def test_what_was_removed_is_told_by_the_first_line_that_the_disk_takes(
     with monkeypatch.context() as full:
         full.setattr(audit_file.os, "write", lambda *_: (_ for _ in ()).throw(OSError(errno.ENOSPC, "full")))
         with pytest.raises(OSError, match="full"):
-            written.append([{"what": "enable"}])
-    (told,) = written.append([{"what": "enable"}])
+            append(written, [{"what": "enable"}])
+    (told,) = append(written, [{"what": "enable"}])
     written.close()
     assert told.startswith("A352") and whats(tmp_path)[-2:] == ["chain broken", "enable"]
 
@@ -138,11 +139,11 @@ def test_what_a_power_cut_may_take_is_synced_before_anybody_relies_on_it(
     monkeypatch.setattr(os, "fsync", note)
     monkeypatch.setattr(Path, "replace", note_replace)
     file = AuditFile(tmp_path, longest_bytes=1)
-    file.append([{"what": "start"}])
+    append(file, [{"what": "start"}])
     began = synced.copy()
     synced.clear()
-    file.append([{"what": "enable"}])
+    append(file, [{"what": "enable"}])
     file.close()
     head = ["head.new", "head.new -> head"]
-    assert began == [tmp_path.name, *head, "audit", "audit", "000000000001.jsonl", *head, "audit"]
-    assert synced == ["000000000002.jsonl", *head, "audit"], "and each new file's name"
+    assert began == [tmp_path.name, *head, "audit", "audit", "000000000001.jsonl", *head]
+    assert synced == ["000000000001.jsonl", "audit", "000000000002.jsonl", *head], "and each new file's name"

@@ -13,6 +13,7 @@ from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import verify_audit
 from gateway.audit.chain import open_line, seal_line
 from gateway.cli.main import command
+from tests.audit.appending import append
 from tests.audit.test_chain import FILE_BYTES, LINES, files_of, records
 
 
@@ -36,7 +37,7 @@ def test_an_audit_that_grows_while_it_is_verified_holds(state: Path, monkeypatch
     def list_late(folder: Path) -> list[Path]:
         found = listing(folder)
         for record in records(LINES, LINES + 1):
-            file.append([record])
+            append(file, [record])
         return found
 
     monkeypatch.setattr(audit_reader, "audit_files", list_late)
@@ -65,7 +66,7 @@ def test_a_first_line_that_is_gone_with_its_file_is_missed(tmp_path: Path) -> No
     """Of files of one line each: nothing is damaged in what is left, and its numbers go on."""
     file = AuditFile(tmp_path, longest_bytes=1)
     for record in records(3):
-        file.append([record])
+        append(file, [record])
     file.close()
     assert verify_audit(tmp_path).broken is None
     files_of(tmp_path)[0].unlink()
@@ -92,7 +93,7 @@ def test_a_chain_that_is_written_anew_behind_what_was_dropped_is_found(tmp_path:
     """Its lines hold, and its head too: only the hash of what was dropped tells."""
     file = AuditFile(tmp_path, FILE_BYTES, kept=3)
     for record in records(40):
-        file.append([record])
+        append(file, [record])
     file.close()
     end = None
     for path in files_of(tmp_path):

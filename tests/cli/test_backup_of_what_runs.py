@@ -10,6 +10,7 @@ from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_reader import verify_audit
 from gateway.cli import state_archive
 from gateway.cli.state_archive import pack_state, unpack_state
+from tests.audit.appending import append
 
 
 @pytest.mark.parametrize("name", ["head", "audit", "000000000001.jsonl"])
@@ -19,11 +20,11 @@ def test_an_audit_that_goes_on_in_another_file_while_it_is_packed_is_whole(
     """Its files were listed before its head was read, which then named a line of one that was not among them."""
     state, add = tmp_path / "state", state_archive._add
     audit = AuditFile(state, longest_bytes=1)
-    audit.append([{"what": "enable"}])
+    append(audit, [{"what": "enable"}])
 
     def rotates(archive: tarfile.TarFile, path: Path, called: str) -> Any:
         for _ in range(2 if path.name == name else 0):
-            audit.append([{"what": "disable"}])
+            append(audit, [{"what": "disable"}])
         add(archive, path, called)
 
     monkeypatch.setattr(state_archive, "_add", rotates)
@@ -40,11 +41,11 @@ def test_an_audit_that_grows_while_it_is_packed_is_not_taken_for_one_whose_end_w
     """Its head was packed behind its lines, and named some that had come between: the next start told of manipulation."""
     state, add = tmp_path / "state", state_archive._add
     audit = AuditFile(state)
-    audit.append([{"what": "enable"}])
+    append(audit, [{"what": "enable"}])
 
     def grows(archive: tarfile.TarFile, path: Path, name: str) -> Any:
         add(archive, path, name)
-        audit.append([{"what": "disable"}])
+        append(audit, [{"what": "disable"}])
 
     monkeypatch.setattr(state_archive, "_add", grows)
     pack_state(state, tmp_path / "b.tar.gz")
@@ -53,7 +54,7 @@ def test_an_audit_that_grows_while_it_is_packed_is_not_taken_for_one_whose_end_w
     verdict = verify_audit(tmp_path / "restored")
     assert verdict.broken is None and verdict.lines >= 1
     restarted = AuditFile(tmp_path / "restored")
-    assert restarted.append([{"what": "start"}]) == ()
+    assert append(restarted, [{"what": "start"}]) == ()
     restarted.close()
 
 

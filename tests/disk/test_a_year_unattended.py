@@ -16,6 +16,7 @@ from gateway.recording import list_recordings, recording_paths
 from gateway.recording.care.keeping import keep_recording, prune_recordings
 from gateway.recording.label import RecordingLabel
 from gateway.service.running_rig.recording.recordings import RUN_COLUMNS, Recordings
+from tests.audit.appending import append
 from tests.disk.at_once import AtOnce
 from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
@@ -128,7 +129,7 @@ def test_a_year_of_audit_takes_no_more_than_its_files_and_still_holds(fast_folde
     longest, kept, most = 1 << 13, 4, 0
     file = AuditFile(fast_folder, longest, kept)
     for number in range(200 * budget):
-        file.append([{"what": "force_setpoint", "old": number, "new": number + 1, "peer": "10.0.0.5:4711"}] * 2)
+        append(file, [{"what": "force_setpoint", "old": number, "new": number + 1, "peer": "10.0.0.5:4711"}] * 2)
         most = max(most, sum(path.stat().st_size for path in (fast_folder / "audit").iterdir()))
     file.close()
     assert most <= kept * (longest + 1000)

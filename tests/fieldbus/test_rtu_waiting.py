@@ -123,24 +123,26 @@ def test_what_came_while_the_process_was_late_is_heard_before_what_waits_for_it_
     assert len(scene.sent) == 1
 
 
-def test_a_late_turn_of_either_loop_reads_the_port_before_it_judges_the_line(run: Any) -> None:
-    """uvloop calls what is due behind its callbacks without a look at the ports."""
+@pytest.mark.parametrize("is_own", [False, True])
+def test_a_late_turn_of_either_loop_reads_the_port_before_it_judges_the_line(run: Any, is_own: bool) -> None:
+    """uvloop calls what is due behind its callbacks without a look at the ports. is_own: the face's own pseudo-terminal, whose
+    bytes are still on its wire behind a look of either loop."""
     words = encode_adu(3, P.write_register_request(1, 777))
     answer = encode_adu(9, bytes((4, len(words))) + words)
 
     async def scene() -> None:
         line, bank, (wake, waker) = Pty(), NotingBank(), os.pipe()
-        server = ModbusRtuServer(
-            bank, RtuSettings(line.path, LINE, 3, Peer("serial:1")), on_peer_closed=print, log=lambda *_: None
-        )
+        settings = RtuSettings(None if is_own else line.path, LINE, 3, Peer("serial:1"))
+        server = ModbusRtuServer(bank, settings, on_peer_closed=print, log=lambda *_: None)
         await server.start()
-        os.write(line.fd, answer[:3])
+        end = os.open(server.path, os.O_RDWR | os.O_NOCTTY) if is_own else os.dup(line.fd)
+        os.write(end, answer[:3])
         while server._receiver.deadline_s is None or server._receiver._wait_s < SPLIT_S:
             await asyncio.sleep(0.001)
 
         def take_long() -> None:
             os.read(wake, 1)
-            os.write(line.fd, answer[3:])
+            os.write(end, answer[3:])
             late_s = monotonic_s() + 2.0 * SPLIT_S
             while monotonic_s() < late_s:  # this process does not run
                 pass
@@ -153,7 +155,7 @@ def test_a_late_turn_of_either_loop_reads_the_port_before_it_judges_the_line(run
         asyncio.get_running_loop().remove_reader(wake)
         await server.close()
         line.close()
-        os.close(wake), os.close(waker)
+        os.close(wake), os.close(waker), os.close(end)
 
     run(scene())
 

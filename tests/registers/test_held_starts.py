@@ -26,7 +26,8 @@ def refused(beat: int = 7) -> HeldEnables:
         (frame(8), True),  # word for word the same, but for what the host's heartbeat register says
         (frame(8, b"\0\0"), False),
         (frame(None, b"\0\0"), True),  # of who beats, a frame without one tells nothing
-        (frame(7, takes=True), False),  # who is refused is told to take over
+        (frame(7, takes=True), True),  # its setpoint was out of range, which hid that it takes over
+        (frame(7, b"\0\x09", takes=True), False),  # who is refused is told to take over
     ],
 )
 def test_a_start_repeats_the_refused_one_by_its_heartbeat_or_its_words(sent: StartFrame, repeats: bool) -> None:
@@ -41,7 +42,8 @@ def test_a_frame_that_comes_on_and_on_is_the_refused_one_for_as_long_as_it_comes
 
 
 @pytest.mark.parametrize(
-    ("sent", "at_s"), [(frame(7), 100.9), (frame(8), 100.5), (frame(7, b"\0\0"), 100.5), (frame(7, takes=True), 100.9)]
+    ("sent", "at_s"),
+    [(frame(7), 100.9), (frame(8), 100.5), (frame(7, b"\0\0"), 100.5), (frame(7, b"\0\x09", takes=True), 100.5)],
 )
 def test_who_writes_enable_as_0_begins_anew_and_is_lost_no_more(sent: StartFrame, at_s: float) -> None:
     told = list[dict[str, list[int]]]()

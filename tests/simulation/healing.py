@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from tests.simulation.schedule import Simulation
 
 HELD_N = 12.0
-HEAL_S = 2.0
+HEAL_S, SWITCH_S = 2.0, 0.3
+"""SWITCH_S: for which a valve that goes to the other side keeps the force waiting."""
 IN_BAND_N = 1.0
 RATE_S, LEAST_RATE = 0.6, 0.6
 """For so long the devices' answers are counted, and of so many as at first there must be so many at least."""
@@ -40,6 +41,8 @@ def heal(simulation: "Simulation") -> None:
         if _is_zero_off(simulation):  # somebody has tared while the cell was broken; noise may refuse one of these
             _tare(simulation)
     healer.hold(HELD_N)
+    if simulation.observer.history.has_valve:
+        simulation._run_for(SWITCH_S)
     simulation._run_for(HEAL_S - RATE_S)
     rates = count_answers(simulation)
     for line, count in simulation.rates.items():

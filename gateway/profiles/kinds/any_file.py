@@ -43,7 +43,8 @@ def check_file(name: str | Path) -> Checked:
     if opened is None:
         return Checked(kind, None, tuple(findings.faults))
     value, faults = _READ[kind](opened[0])
-    return Checked(kind, None if faults else value, tuple(sorted(faults)))
+    warnings = opened[0].warn_of_glued_comments() if kind == "device" else ()
+    return Checked(kind, None if faults else value, tuple(sorted(faults)), tuple(warnings))
 
 
 def _plan(document: Document) -> tuple[AnyPlan | None, list[ProfileFault]]:

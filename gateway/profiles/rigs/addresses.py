@@ -15,13 +15,34 @@ def _address(text: str) -> str:
         raise ValueError(f'"{text}" is not an IP address such as 127.0.0.1 or 192.168.125.10') from None
 
 
+def _bind(text: str) -> str:
+    try:
+        return _address(text)
+    except ValueError as error:
+        host, port = _split_port(text)
+        cure = f"; the port has a key of its own: bind: {host} and port: {port}" if port else ""
+        raise ValueError(f"{error}{cure}") from None
+
+
 def _owner(text: str) -> str:
     if serial_place(text) is not None or is_certificate(text):
         return text
     try:
         return _as_peer(_address(text))
     except ValueError as error:
-        raise ValueError(f"{error}, nor a serial face such as serial:1, nor certificate NAME") from None
+        host, port = _split_port(text)
+        cure = f"; an owner has no port: write {host}" if port else ""
+        raise ValueError(f"{error}, nor a serial face such as serial:1, nor certificate NAME{cure}") from None
+
+
+def _split_port(text: str) -> tuple[str, str]:
+    """Return address and port of ADDRESS:PORT or [IPV6]:PORT; empty ones of anything else."""
+    host, _, port = text.rpartition(":")
+    host = host[1:-1] if host.startswith("[") and host.endswith("]") else host
+    try:
+        return (_address(host), port) if port.isdecimal() else ("", "")
+    except ValueError:
+        return "", ""
 
 
 def _as_peer(text: str) -> str:
@@ -53,6 +74,8 @@ def _suggest_network(text: str) -> str:
 
 
 Address = Annotated[str, AfterValidator(_address)]
+BindAddress = Annotated[str, AfterValidator(_bind)]
+"""Of a section that has a key `port` beside it."""
 Owner = Annotated[str, AfterValidator(_owner)]
 Network4Or6 = Annotated[
     IPv4Network | IPv6Network,

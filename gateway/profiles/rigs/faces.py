@@ -16,7 +16,7 @@ from gateway.defaults import STRICT
 from gateway.devices.line_settings import Baud, Parity, SerialSettings
 from gateway.modbus.rtu import LARGEST_UNIT, silence_s
 from gateway.plain_file import expand_home
-from gateway.profiles.rigs.addresses import Address, Network4Or6
+from gateway.profiles.rigs.addresses import BindAddress, Network4Or6
 
 _OF_TLS: Final = ("bind", "certificate", "key", "ca", "allow", "revoked")
 _OF_RTU: Final = ("baud", "parity", "stop_bits", "unit", "role")
@@ -86,7 +86,7 @@ class TlsFace:
     KEPT_ELSEWHERE: ClassVar[Mapping[str, str]] = dict.fromkeys(_OF_RTU, "to a face of `type: rtu`")
     __pydantic_config__ = STRICT
     type: Literal["tls"]  # Modbus TCP by TLS
-    bind: Address = defaults.HOST  # the gateway's own address; any but loopback needs `allow`
+    bind: BindAddress = defaults.HOST  # the gateway's own address; any but loopback needs `allow`
     port: Annotated[int, Ge(0), Le(65535)] = defaults.TLS_PORT  # 0: any free port; below 1024 needs a privilege
     certificate: FilePath  # the gateway's own, PEM; a path from this file, as the next two
     key: FilePath  # its private key, PEM, readable by its owner only

@@ -26,7 +26,7 @@ from gateway.devices.checksum import ChecksumName
 from gateway.devices.line_settings import Baud
 from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.recordings_section import RecordingsSection
-from gateway.profiles.rigs.addresses import Address, Network4Or6, Owner
+from gateway.profiles.rigs.addresses import BindAddress, Network4Or6, Owner
 from gateway.profiles.rigs.faces import Face
 from gateway.profiles.telemetry_sections import Mqtt
 
@@ -100,7 +100,7 @@ class Network:
     """The Modbus TCP face."""
 
     __pydantic_config__ = STRICT
-    bind: Address = defaults.HOST  # the gateway's own address; any but loopback needs `allow`
+    bind: BindAddress = defaults.HOST  # the gateway's own address; any but loopback needs `allow`
     port: Annotated[int, Ge(0), Le(65535)] = defaults.MODBUS_PORT  # 0: any free port; below 1024 needs a privilege
     units: Annotated[tuple[Annotated[int, Ge(0), Le(255)], ...], MinLen(1)] = (
         defaults.UNIT_IDS

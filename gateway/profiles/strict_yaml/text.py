@@ -8,6 +8,7 @@ Decisions
 - The first syntax error ends the reading, for what follows it would be guesswork; all other faults are collected.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -23,6 +24,7 @@ LARGEST_BYTES: Final = 1 << 20
 _DEEPEST: Final = 32
 _NO_KEY: Final = "a key must be a word or a whole number"
 _BLOCKS: Final = (">", "|")
+_GLUED_COMMENT: Final = re.compile(r"[ \t]+(#[^\s#]\S*)")
 _TEXT_TAG: Final = "tag:yaml.org,2002:str"
 
 
@@ -43,6 +45,8 @@ class Document:
     file: str
     value: Any
     marks: dict[Path, Mark] = field(repr=False)
+    glued: dict[Path, str] = field(repr=False, default_factory=dict)
+    """Behind which unquoted texts a comment begins that has no space behind its `#`, and its first word."""
 
     def fault(self, path: Path, message: str, *, at_key: bool = False) -> ProfileFault:
         """Return a fault at path; a path that the file does not have is placed at its nearest parent."""
@@ -52,6 +56,16 @@ class Document:
         mark = self.marks.get(place, Mark(1, 1, 1, 1))
         line, column = (mark.key_line, mark.key_column) if at_key else (mark.line, mark.column)
         return ProfileFault(self.file, line, column, path_text(path), message)
+
+    def warn_of_glued_comments(self) -> list[ProfileFault]:
+        """Return a warning for each text that may have lost its end: to whoever wrote `V #1` it is one sentence."""
+        sentence = (
+            "is {text} alone, for `{word}` is a comment: quote the text where it belongs to it, or write `# {bare}`"
+        )
+        return [
+            self.fault(path, sentence.format(text=self.at(*path), word=word, bare=word[1:]))
+            for path, word in self.glued.items()
+        ]
 
     def at(self, *path: str | int) -> Any:
         """Return the value at path, None when there is none."""
@@ -78,7 +92,7 @@ def parse(data: bytes, file: str) -> Document:
         )
     if reader.faults:
         raise ProfileError(reader.faults)
-    return Document(file, value, reader.marks)
+    return Document(file, value, reader.marks, reader.glued)
 
 
 def _kind(value: object) -> str:
@@ -106,6 +120,7 @@ class _Reader:
         self.file = file
         self.text = text
         self.marks: dict[Path, Mark] = {}
+        self.glued: dict[Path, str] = {}
         self.faults: list[ProfileFault] = []
 
     def document(self) -> Any:
@@ -161,7 +176,10 @@ class _Reader:
         if not event.implicit[0]:  # quoted, a block, or `!!str`; both parsers say it here, not in `style`
             return event.value
         try:
-            return plain_scalar(event.value)
+            value = plain_scalar(event.value)
+            if isinstance(value, str) and (comment := _GLUED_COMMENT.match(self.text, event.end_mark.index)):
+                self.glued[path] = comment[1]
+            return value
         except ValueError as error:
             return self._fault(event, path, str(error))
 

@@ -243,10 +243,10 @@ def groups(kind: type) -> tuple[tuple[str, type], ...]:
 
 
 def _kinds(hint: Any) -> list[type]:
-    """Return the dataclasses of a union of several."""
-    return (
-        [one for one in _members(hint) if is_dataclass(one) and isinstance(one, type)] if not is_dataclass(hint) else []
-    )
+    """Return the dataclasses of a union of several; of one alone none, for nothing chooses it."""
+    if is_dataclass(hint):
+        return []
+    return [one for one in _members(hint) if is_dataclass(one) and isinstance(one, type)]
 
 
 def _members(hint: Any) -> Iterator[Any]:

@@ -68,14 +68,17 @@ class _Refused(NamedTuple):
 
     def is_same(self, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new. Of who beats one without a heartbeat does not: the one that stands may be
-        another's. Who is refused because another one owns is told to take over."""
+        another's. Who is refused because another one owns is told to take over: not by the same frame, of which nobody knows
+        that it takes over where its setpoint was out of range."""
         if self.is_let_go:
             return frame.data in self.sent.values()
+        if frame.data == self.frame.data:
+            return True
         if frame.takes and not self.frame.takes:
             return False
         if frame.heartbeat is None and self.beats:
             return not self.is_moving
-        return frame.heartbeat == self.heartbeat or frame.data == self.frame.data
+        return frame.heartbeat == self.heartbeat
 
 
 class LastTares:

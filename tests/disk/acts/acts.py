@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
-from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_file import AuditFile, Place
 from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.bsfm import Calibration
 from gateway.calibrations.store import CalibrationStore
@@ -103,20 +103,31 @@ class StoredPlants(Act):
 
 
 class AuditedWrites(Act):
-    """Batches of the audit, over several files of which the oldest go."""
+    """Batches of the audit, over several files of which the oldest go; each second one is synced with the one before it."""
 
-    BATCHES = 9
+    BATCHES = 19
 
     def run(self, say: Say) -> None:
         first = 1 + max((record.get("old", 0) for record in read_audit(self.state)), default=0)
-        file, refusals = AuditFile(self.state, longest_bytes=700, kept=2), []
+        file, refusals, again = AuditFile(self.state, longest_bytes=1200, kept=2), [], False
+        written, place = list[dict[str, Any]](), Place()
         with contextlib.closing(file):
             for number in range(first, first + self.BATCHES):
+                written.append({"what": "force_setpoint", "old": number, "new": number + 1})
                 try:
-                    file.append([{"what": "force_setpoint", "old": number, "new": number + 1}])
-                    say(number)
+                    if not (put := file.write(written if again else written[-1:], again=again)):
+                        file.sync(place)
+                        del written[:-1]
+                        put = file.write(written)
+                    assert put
+                    place, again = put.place, False
+                    if number % 2:
+                        file.sync(place)
+                        written.clear()
+                        say(number)
                 except OSError as refusal:  # as long as the gateway runs it goes on with the same file
                     refusals.append(refusal)
+                    again = True
         if refusals:
             raise refusals[0]
 

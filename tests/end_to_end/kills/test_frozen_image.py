@@ -31,9 +31,10 @@ import sys
 from itertools import count
 from pathlib import Path
 from gateway.audit.audit_file import AuditFile
+from tests.audit.appending import append
 file = AuditFile(Path(sys.argv[1]), longest_bytes=3000, kept=5)
 for number in count(1):
-    file.append([{"what": "force_setpoint", "old": number, "new": number + 1}])
+    append(file, [{"what": "force_setpoint", "old": number, "new": number + 1}])
     print(number, flush=True)
 """
 

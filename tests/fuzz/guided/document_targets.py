@@ -13,6 +13,7 @@ from gateway.profiles import ProfileError, check_file, shipped_profiles_folder
 from gateway.profiles.strict_yaml import text
 from gateway.recording import Recorder, RecordingError, read_table
 from gateway.service import socket_requests
+from tests.audit.appending import append
 
 FOLDER = Path(tempfile.mkdtemp(prefix="guided-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
 atexit.register(shutil.rmtree, FOLDER, ignore_errors=True)
@@ -66,7 +67,7 @@ def judge_audit(data: bytes) -> None:
 def write_audit(state: Path) -> None:
     file = AuditFile(state, 1200)
     for k in range(14):
-        file.append([{"what": "force_setpoint", "old": k, "new": k + 1.5, "peer": "10.0.0.5:4711"}])
+        append(file, [{"what": "force_setpoint", "old": k, "new": k + 1.5, "peer": "10.0.0.5:4711"}])
     file.close()
 
 

@@ -1,7 +1,11 @@
 """What the author of a device file is told: one sentence for one slip, at its place, with what may stand there."""
 
+from pathlib import Path
+
 import pytest
 
+from gateway.profiles.find import list_shipped
+from gateway.profiles.kinds.any_file import check_file
 from gateway.profiles.kinds.devices import read_device
 from gateway.profiles.strict_yaml.text import parse
 
@@ -126,6 +130,26 @@ def test_a_stream_has_a_pace_and_no_question(new: str, sentence: str) -> None:
     assert sentence in fault
 
 
+def test_a_comment_that_may_be_the_end_of_a_device_s_words_is_warned_of(tmp_path: Path) -> None:
+    """`ask: V #1` asked `V`, and nobody was told."""
+    path = tmp_path / "my-dac.yaml"
+    text = DAC.replace('ask: "@{address:d} V{counts:d}"', "ask: V{counts:d} #1").replace("19200}", "19200} #fast")
+    path.write_text(text.replace("reading", "reading # noise") + "# the end\n")
+    (warning,) = check_file(path).warnings
+    assert str(warning).removeprefix(f"{path}:") == (
+        "18:8 set_voltage.ask: is V{counts:d} alone, for `#1` is a comment: quote the text where it belongs to it, or "
+        "write `# 1`"
+    )
+    path.write_text(text.replace("#1", "# 1"))
+    assert check_file(path).warnings == ()
+
+
+@pytest.mark.parametrize("name", list_shipped("device"))
+def test_no_shipped_device_is_warned_of(name: str) -> None:
+    checked = check_file(name)
+    assert checked.value is not None and checked.warnings == ()
+
+
 REGISTERS = (
     "codec: modbus-rtu\nread_force: {modbus: {function: 3, first: 0, last: 0, weight: 0}, unit: N, rate_hz: 9}\n"
 )
@@ -149,6 +173,9 @@ REGISTERS = (
             "steps:",
             "set_voltage, read_voltage, read_pressure and steps",
         ),
+        ('terminator: "\\r\\n"\n', "", "stream:", "terminator is missing"),
+        ('terminator: "\\r\\n"\n', 'terminator: ""\n', "terminator:", "terminator is missing"),
+        ('terminator: "\\r\\n"\n', 'terminator: "é"\n', "terminator:", "terminator and question_terminator are ASCII"),
     ],
 )
 def test_what_does_not_fit_the_rest_of_a_profile_is_told_at_its_line(

@@ -177,6 +177,23 @@ def test_what_is_proposed_for_a_section_is_taken_there(line: str, sentence: str)
 
 
 @pytest.mark.parametrize(
+    ("new", "cure"),
+    [
+        (
+            "bind: 192.168.125.20:5020",
+            "192.168.125.10; the port has a key of its own: bind: 192.168.125.20 and port: 5020",
+        ),
+        ('bind: "[::1]:5020"', "192.168.125.10; the port has a key of its own: bind: ::1 and port: 5020"),
+        ("bind: robot:5020", "127.0.0.1 or 192.168.125.10"),
+        ("owner: 10.0.0.5:4711", "nor certificate NAME; an owner has no port: write 10.0.0.5"),
+    ],
+)
+def test_an_address_with_a_port_is_told_where_the_port_belongs(new: str, cure: str) -> None:
+    (fault,) = told(("bind: 127.0.0.1", new))
+    assert "is not an IP address such as" in fault and fault.endswith(cure)
+
+
+@pytest.mark.parametrize(
     ("new", "sentence"),
     [
         ("bind: true", 'network.bind: "true" is not an IP address such as 127.0.0.1 or 192.168.125.10'),

@@ -106,4 +106,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(12.1441, "worker", "disconnect"),
         ],
     ),
+    (
+        213525,
+        [
+            Event(6.2301, "person", "say", data=b'{"do": "calibration", "use": 2}'),
+            Event(9.189, "worker", "take", (46.38,)),
+            Event(10.1681, "worker", "hang", (40148.0,)),
+            Event(11.9479, "integrator", "upload"),
+        ],
+    ),
 ]

@@ -221,6 +221,9 @@ class SimulatedPort:
         """What the kernel still holds of what was written."""
         return max(0, int((self._cable.through_s - self._loop.time()) / self._settings.character_s))
 
+    def read_arrived(self) -> None:
+        self._read()
+
     def flush_input(self) -> int:
         dropped = len(self._buffer)
         self._buffer.clear()

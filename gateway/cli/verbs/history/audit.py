@@ -49,26 +49,27 @@ def show_command(*, after: str, peer: str | None, as_json: bool, state: StateCho
 def verify_command(*, as_json: bool, state: StateChoice) -> None:
     """Follow the chain of hashes; exit code 1 at its first break.
 
-    A changed byte, and a line removed, added or moved are found; an incomplete last line, as a power cut leaves it, is
-    told apart. Who may write the directory can write a whole new chain: keep the last hash elsewhere where that matters.
+    A changed byte, and a line removed, added or moved are found; what a power cut leaves behind the last line that was
+    on the disk for certain (audit/head names it) is told apart. Who may write the directory can write a whole new
+    chain: keep the last hash elsewhere where that matters.
     """
     _directory_of(state)
     try:
         verdict = verify_audit(state.directory)
     except FileNotFoundError:
         raise _no_audit(state) from None
+    held = "1 line holds" if verdict.lines == 1 else f"{verdict.lines} lines hold"
     if as_json:
         broken = verdict.broken._asdict() if verdict.broken else None
         facts = {"lines": verdict.lines, "last": verdict.end._asdict(), "broken": broken, "notes": verdict.notes}
         click.echo(json.dumps(facts, indent=2))
     elif not verdict.broken:
-        click.echo(f"{verdict.lines} lines hold, up to line {verdict.end.number}, sha256 {verdict.end.sha256}")
+        click.echo(f"{held}, up to line {verdict.end.number}, sha256 {verdict.end.sha256}")
     for note in () if as_json else verdict.notes:
         click.echo(note)
     if verdict.broken:
         where = f"{verdict.broken.file} line {verdict.broken.line}" if verdict.broken.line else verdict.broken.file
-        held = f"the {verdict.lines} lines before it hold" if verdict.lines else "nothing before it holds"
-        raise CliError(f"E170 {where} {verdict.broken.text}; {held}")
+        raise CliError(f"E170 {where} {verdict.broken.text}; before it {held if verdict.lines else 'nothing holds'}")
 
 
 def format_record(record: dict[str, Any]) -> str:

@@ -5,14 +5,9 @@ wire an ever older past. Setpoints go before polls; polls fill the idle wire and
 the pressure where the device measures it, else the setting that stands (both in turn where a setting is answered without its
 number), else, of a device that cannot be asked anything, the same setting once more. Time comes in as an argument.
 
-An answer may come after its time has run out, when the next question is already out, and a bare number does not say what
-it answers. Taken for the next question's, each following answer would be one behind for as long as the setpoint moves, and
-an honest device would look like one that alters its settings. So after a time-out an answer that repeats a setting which was
-given up answers that one, and what was asked last is still out. One that repeats neither is believed by nobody: the line is
-left alone for one reply time, then asked anew. A falling voltage never waits. After any of them the setting is read or sent
-anew: the device may have lost its power, and stand where it then begins. What a line that stands still has not sent of a
-given-up question is dropped: no older voltage goes out before the safe one. An answer that comes twice has the same effect:
-where an echo repeats the setting before, the line is left alone as well.
+What is done about an answer that comes late, garbled or twice, given_up_questions tells. Behind one the setting is read or
+sent anew: the device may have lost its power, and stand where it then begins. What a line that stands still has not sent of
+a given-up question is dropped: no older voltage goes out before the safe one.
 
 Between the first setting, which is the safe one, and any other stand the questions of device_checks. A watchdog is fed by a
 sentence that nobody answers. A device whose watchdog has tripped obeys no setting until it is cleared; it is told the safe
@@ -43,11 +38,12 @@ from gateway.devices.messages import (
 from gateway.devices.template_codecs.unread_line import explain_answer
 from gateway.service.running_rig.lines.device_checks import DeviceChecks
 from gateway.service.running_rig.lines.given_up_questions import GivenUpQuestions
+from gateway.service.running_rig.lines.repeated_failures import RepeatedFailures
 
-_FAILURES_BEFORE_FAULT = 3  # in a row; one bad echo is noise on the line
 _POLL_PERIOD_S = 0.1
 _REPEATED_S = 0.5  # of a setting at rest
 _AWAY_S = 0.5  # of silence: what answers then may be another device, or one that was switched on again
+_FALLS_FIRST_S = 0.2  # between two questions about the device, of a voltage that falls, but not to where it rests
 _AFTER_SIGN_OF_LIFE_S = 0.005  # nothing tells when the device is through with a sentence that it does not answer
 
 
@@ -84,7 +80,7 @@ class OutputExchange:
         self.checks = checks or DeviceChecks(host, is_waived=False)
         self._write, self._reply_timeout_s = write, reply_timeout_s
         self._given_up = GivenUpQuestions(reply_timeout_s)
-        self.counts, self.round_trip_s = WireCounts(), nan
+        self.counts = WireCounts()
         self.reset()
 
     def reset(self) -> None:
@@ -98,20 +94,19 @@ class OutputExchange:
         self._sent_v = self._setting_s = self.pressure_pa = nan
         self.standing_v: float | None = None
         self._given_up.forget()
-        self._is_overdue = self._is_behind = False  # a question was given up; its answer came, that to the last is out
+        self._is_behind = False  # the answer to one that was given up came, that to the last is out
         self._patience_s = self._reply_timeout_s  # shorter where garbage came: behind a round trip that was the answer
         self._refused_v = nan  # a moment ago: perhaps the watchdog has tripped, which is asked before the next try
         self._is_altered = False  # the last echo was another voltage
-        self._quiet_until_s = self._sent_s = self._next_poll_s = self._said_s = 0.0
-        self._polls, self._frame, self._unread, self._line_fault = 0, b"", "", FaultCode.NONE
-        self._failures: dict[object, int] = {}
+        self._quiet_until_s = self._sent_s = self._next_poll_s = self._said_s = self._checked_s = 0.0
+        self._polls, self._frame, self._unread, self._failures = 0, b"", "", RepeatedFailures()
         self.acknowledged_v: float | None = None
         self.unanswered_since_s: float | None = None
 
     @property
     def fault(self) -> FaultCode:
         """Fault of the device or its line."""
-        return self.checks.fault or self._line_fault
+        return self.checks.fault or self._failures.fault
 
     @property
     def said(self) -> str:
@@ -131,6 +126,11 @@ class OutputExchange:
     def sent_v(self) -> float | None:
         """The setting that went out last, None before the first."""
         return self._asked_v if self._asked_v < inf else None
+
+    @property
+    def round_trip_s(self) -> float:
+        """Return what the last answer took that is surely its question's own, s; nan before the first."""
+        return self._given_up.round_trip_s
 
     @property
     def line(self) -> LineState:
@@ -154,7 +154,7 @@ class OutputExchange:
         """Give up an answer that is overdue or was garbled, and ask again; unanswered_since_s keeps the age of the silence."""
         if self._in_flight is not None and now_s - self._sent_s > self._patience_s:
             self._give_up(self._in_flight)
-            if self.drop_unsent:
+            if self.drop_unsent and self._patience_s >= self._reply_timeout_s:  # else the line goes on
                 self.drop_unsent()
             self._next_poll_s = now_s  # ask again at once: three tries fit into the bound on silence
         self._send_next(now_s)
@@ -165,8 +165,8 @@ class OutputExchange:
             self.standing_v = None
         if isinstance(question, AskDevice):
             self.checks.miss(question.step)
-        self._given_up.note(question, self._sent_s)
-        self._in_flight, self._is_overdue = None, True
+        self._given_up.give_up(question, self._sent_s)
+        self._in_flight = None
 
     def _send_next(self, now_s: float) -> None:
         wanted_v = self._wanted_v
@@ -186,7 +186,6 @@ class OutputExchange:
             self._refused_v = nan
             self._send(AskDevice(step), now_s)
         elif not (self._is_confirmed(wanted_v) or self._gives_way(wanted_v, now_s)) and self._may_obey(wanted_v, now_s):
-            self._is_overdue = self._is_overdue or now_s < self._quiet_until_s
             if wanted_v != self._asked_v:
                 self._before_v = self._asked_v
             self._asked_v, self.standing_v = wanted_v, None
@@ -216,16 +215,26 @@ class OutputExchange:
         return standing_v is not None and abs(voltage_v - standing_v) <= 0.5 * self._host.resolution_v
 
     def _gives_way(self, wanted_v: float, now_s: float) -> bool:
-        """To a late check, where something presses and does not fall; not twice running, or no answer looks like silence."""
-        return self._asked_v <= wanted_v != self._rest_v and self._said_s == self._sent_s and self.checks.is_late(now_s)
+        """To a late check, where something presses; not twice running, or no answer looks like silence. One that falls,
+        but not to where it rests, does so seldom: a whole long fall on a slow wire a device would press unwatched."""
+        if wanted_v == self._rest_v or not self._is_check_next(now_s):
+            return False
+        is_seldom = now_s - self._checked_s > _FALLS_FIRST_S and now_s >= self._quiet_until_s
+        return wanted_v >= self._asked_v or is_seldom
+
+    def _is_check_next(self, now_s: float) -> bool:
+        return self._said_s == self._sent_s and self.checks.is_late(now_s)
 
     def _may_obey(self, voltage_v: float, now_s: float) -> bool:
-        """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be."""
-        return not self.checks.is_tripped or voltage_v != self._asked_v or now_s >= self._next_poll_s
+        """Where the watchdog is said to have tripped, the same setting is tried no more often than a poll would be, and in turn
+        with what clears it: on a slow wire it was never cleared."""
+        is_again = self.checks.is_tripped and voltage_v == self._asked_v
+        return not is_again or (now_s >= self._next_poll_s and not self._is_check_next(now_s))
 
     def _send(self, request: OutputRequest, now_s: float) -> None:
         self._in_flight, self._sent_s, self._is_behind, self._patience_s = request, now_s, False, self._reply_timeout_s
         self._said_s = now_s if isinstance(request, SetVoltage) else self._said_s
+        self._checked_s = now_s if isinstance(request, AskDevice) else self._checked_s
         self.counts.asked += 1
         if self.unanswered_since_s is None:
             self.unanswered_since_s = now_s
@@ -235,10 +244,10 @@ class OutputExchange:
     def _on_reply(self, reply: OutputReply, now_s: float) -> None:
         if isinstance(reply, Garbage):
             self.counts.garbled += 1
-            self._patience_s = min(self._reply_timeout_s, self.round_trip_s)
+            self._patience_s = self._given_up.patience_s
             self._unread = explain_answer(reply.data, self._frame)
             if self._in_flight is None:  # unasked: that was it
-                self._is_overdue = False
+                self._given_up.is_overdue = False
                 del self._given_up.questions[:1]
             return
         request, self._in_flight = self._in_flight, None
@@ -250,24 +259,26 @@ class OutputExchange:
             self.checks.begin()
             self.standing_v = None  # a watchdog has put out its own, say: what is read back was commanded before
         self.unanswered_since_s, self._unread = None, ""
-        if self._is_overdue and not self._is_echo(request, reply):
+        is_doubtful = self._given_up.is_overdue or now_s < self._quiet_until_s
+        if is_doubtful and not self._is_echo(request, reply):
             self._given_up.note_strange(now_s)
             if request is not None:
                 self._given_up.note(request, self._sent_s)  # if what came was of an older one
-            self._is_overdue, self._quiet_until_s = False, now_s + self._reply_timeout_s
+            # one reply time: else what is not its echo, a refusal of each fall, is doubted for as long as it falls
+            self._quiet_until_s = self._quiet_until_s if now_s < self._quiet_until_s else now_s + self._reply_timeout_s
             return
-        self._given_up.questions.clear()
-        self.answer_late_s, self.round_trip_s = 0.0, now_s - self._sent_s
+        self._given_up.note_answer(now_s - self._sent_s)
+        self.answer_late_s = 0.0
         if isinstance(request, AskDevice):
             self._take_check(request, reply)
         elif isinstance(reply, WatchdogTripped):
             self.checks.trip()
         elif isinstance(reply, Pressure):
             self.pressure_pa = reply.pressure_pa
-            self._note_success(type(request))
+            self._failures.note_success(type(request))
         elif isinstance(reply, Refused):
             self._refused_v = request.voltage_v if isinstance(request, SetVoltage) else nan
-            self._count_failure(type(request), FaultCode.OUTPUT_REFUSED)
+            self._failures.count(type(request), FaultCode.OUTPUT_REFUSED)
         elif request is not None and isinstance(reply, Accepted):
             self._check_setting(request, reply, now_s)
 
@@ -307,7 +318,7 @@ class OutputExchange:
         self.acknowledged_v, self.standing_v = reply.voltage_v, None
         if not self._host.confirms(self._asked_v, reply, request):
             self._is_altered = True
-            self._count_failure(type(request), FaultCode.OUTPUT_ALTERED)
+            self._failures.count(type(request), FaultCode.OUTPUT_ALTERED)
             if self._host.confirms(self._before_v, reply, request):  # perhaps it came twice, and all behind it are late
                 self._quiet_until_s = now_s + self._reply_timeout_s
             return
@@ -315,16 +326,4 @@ class OutputExchange:
         if not was_altered:
             is_coarse = abs(reply.voltage_v - self._asked_v) > self._host.resolution_v  # it counts in coarser steps
             self.standing_v = self._asked_v if is_coarse else reply.voltage_v
-        self._note_success(type(request))
-
-    def _note_success(self, question: type) -> None:
-        """The fault ends with whichever question was its last reason: where the safe voltage stands, only polls go on."""
-        self._failures[question] = 0
-        if max(self._failures.values()) < _FAILURES_BEFORE_FAULT:
-            self._line_fault = FaultCode.NONE
-
-    def _count_failure(self, question: type, fault: FaultCode) -> None:
-        """Counted by question: an echo that agrees makes no reading good that does not."""
-        self._failures[question] = self._failures.get(question, 0) + 1
-        if self._failures[question] >= _FAILURES_BEFORE_FAULT:
-            self._line_fault = fault
+        self._failures.note_success(type(request))

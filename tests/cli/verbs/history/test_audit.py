@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from gateway.audit.audit_file import AuditFile
+from gateway.audit.audit_file import AuditFile, audit_files
 from gateway.audit.write_series import WriteSeries
 from gateway.cli.verbs.history.audit import format_record
+from tests.audit.appending import append
 
 
 @pytest.fixture
@@ -21,7 +22,7 @@ def state(tmp_path: Path) -> Path:
             "old": 1,
             "new": 2,
         }
-        file.append([record])
+        append(file, [record])
     file.close()
     return tmp_path
 
@@ -47,10 +48,21 @@ def test_only_who_and_what_was_asked_for_is_shown(state: Path, call, words: tupl
     assert answer.exit_code == 0 and numbers(answer.output) == shown
 
 
+@pytest.mark.parametrize(("altered", "held"), [(1, "nothing holds"), (2, "1 line holds"), (3, "2 lines hold")])
+def test_how_many_lines_hold_is_told_in_the_right_number(state: Path, call, altered: int, held: str) -> None:
+    """E170 said that "the 1 lines before it hold"."""
+    (path,) = audit_files(state / "audit")
+    lines = path.read_bytes().splitlines(keepends=True)
+    assert call("audit", "verify", "--state", state).stdout.startswith("3 lines hold, ")
+    lines[altered - 1] = lines[altered - 1].replace(b'"what"', b'"whet"')
+    path.write_bytes(b"".join(lines))
+    assert call("audit", "verify", "--state", state).stderr.endswith(f"; before it {held}\n")
+
+
 def test_behind_a_clock_that_was_set_back_it_is_read_on(state: Path, call) -> None:
     file = AuditFile(state, 1 << 20)
-    file.append(
-        [{"time": "2026-11-22T09:00:00.000Z", "peer": "10.0.0.5:1", "what": "force_setpoint", "old": 2, "new": 3}]
+    append(
+        file, [{"time": "2026-11-22T09:00:00.000Z", "peer": "10.0.0.5:1", "what": "force_setpoint", "old": 2, "new": 3}]
     )
     file.close()
     answer = call("audit", "show", "--json", "--since", "2026-11-22T10:02", "--state", state)
@@ -116,7 +128,7 @@ def test_of_an_owner_that_came_or_went_nobody_is_told() -> None:
 def test_a_line_that_somebody_has_written_who_knows_how_hides_none_behind_it(tmp_path: Path, call, fields) -> None:
     """`audit show` ended at it with an internal error."""
     file = AuditFile(tmp_path)
-    file.append([fields, {"time": "2027-01-01T00:00:00.000Z", "what": "enable"}])
+    append(file, [fields, {"time": "2027-01-01T00:00:00.000Z", "what": "enable"}])
     file.close()
     for words in ((), ("--since", "2000-01-01"), ("--json",)):
         shown = call("audit", "show", *words, "--state", tmp_path)

@@ -195,12 +195,15 @@ def test_an_arming_that_nobody_answers_leaves_every_other_turn_to_the_setpoint()
     assert line.exchange.checks.times_forgotten == 1 and line.stands_v > 0.1
 
 
-@pytest.mark.parametrize(("next_v", "gives_way"), [(5.0, True), (3.0, False)])
-def test_a_setting_gives_way_to_a_late_question_unless_the_force_falls(
-    next_v: float, gives_way: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("next_v", "begun_s", "gives_way"), [(5.0, 0.1, True), (3.0, 0.1, False), (3.0, 0.5, True), (0.0, 0.5, False)]
+)
+def test_a_setting_gives_way_to_a_late_question_one_that_falls_seldom_and_the_safe_one_never(
+    next_v: float, begun_s: float, gives_way: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """begun_s: since the device was asked about itself. In a long fall it was not, and its watchdog did not watch."""
     line = PlayedLine()
-    line.run(0.5)
+    line.run(begun_s)
     line.exchange.set_voltage(4.0, line.now_s)
     monkeypatch.setattr(line.exchange.checks, "is_late", lambda now_s: True)
     monkeypatch.setattr(line.exchange.checks, "next_step", lambda now_s: STATUS)

@@ -10,6 +10,7 @@ from gateway.service.running_rig.lines.output_line import OutputExchange
 from tests.profile_files import load_device
 
 ALLOWED_S = 0.3  # of silence
+REST_S = 0.2  # in which a reading tells an adapter that hears itself
 WAVESHARE = load_device("waveshare-ao8b")
 
 
@@ -35,7 +36,7 @@ class Bus:
             self._coming.append((through_s + 0.004 + len(answer) * self._character_s, answer))
 
     def silent_s(self, until_s: float, change_v: float) -> float:
-        """The longest silence that was noticed, while another voltage is wanted at each tick."""
+        """The longest silence that was noticed, while behind a moment of rest another voltage is wanted at each tick."""
         chance, wanted_v, longest_s = random.Random(7), 3.0, 0.0
         for step in range(round(until_s * 1000)):
             self.now_s = step / 1000
@@ -43,7 +44,7 @@ class Bus:
                 self._coming.remove(due)
                 self.exchange.on_bytes(due[1], self.now_s)
             if step % 10 == 0:
-                wanted_v += chance.uniform(-change_v, change_v)
+                wanted_v += chance.uniform(-change_v, change_v) if self.now_s > REST_S else 0.0
                 self.exchange.tick(self.now_s)
                 self.exchange.set_voltage(wanted_v, self.now_s)
             since_s = self.exchange.unanswered_since_s

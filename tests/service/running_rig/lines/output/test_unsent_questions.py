@@ -29,3 +29,16 @@ def test_a_fall_that_does_not_wait_cuts_no_question_that_is_on_the_wire(wire: Wi
     wire.answer("420", after_s=0.001)
     wire.set_voltage(0, after_s=0.001)
     assert (dropped, wire.last) == (["SET 420"], "SET 0")
+
+
+def test_a_question_whose_answer_was_garbled_is_not_cut_on_the_wire(wire: Wire) -> None:
+    """The line goes on: behind half a question the device does not hear the next one, which may be the safe voltage."""
+    dropped: list[str] = []
+    wire.exchange.drop_unsent = lambda: dropped.append(wire.last)
+    wire.settle(400)
+    wire.set_voltage(420)
+    wire.answer("#", after_s=0.001)
+    wire.tick(0.03)
+    assert wire.written[-2:] == [b"SET 420\r\n"] * 2 and not dropped
+    wire.tick(REPLY_TIMEOUT_S + 0.01)
+    assert dropped
