@@ -97,7 +97,7 @@ class EdgeCheck:
         commands, before = self._commands, self._commands.command
         if (
             at.held_n is None
-            or (commands.would_have_beaten_since(at.lost_s, command) and not command.repeats)
+            or (commands.would_have_beaten_since(at.lost_s, at.now_s, command) and not command.repeats)
             or commands.would_start_lease(command)
         ):
             return None
@@ -138,6 +138,8 @@ class EdgeCheck:
             if self._valve is not None and command.control_word & ControlBit.VALVE_PULL:  # it would turn under the run
                 yield _no_run(_reason_of(plan), f"valve_pull is 1, {_PUSHING}", plan)
             yield from _some(self.of_run(plan, _in(state, at)))
+            if state not in ENABLED_STATES:
+                yield from _some(self._repeated(command, at, _bit_of(plan), _name_of(plan)))
             if held := _setpoints(command):
                 yield _no_run(_reason_of(plan), f"{' and '.join(held)}: a run begins with setpoint 0", plan)
         if len(plans) > 1:
@@ -175,13 +177,14 @@ class EdgeCheck:
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
         return None
 
-    def _repeated(self, command: Command, at: Situation) -> EdgeRefusal | None:
+    def _repeated(
+        self, command: Command, at: Situation, bit: ControlBit = ControlBit.ENABLE, what: str = "enable"
+    ) -> EdgeRefusal | None:
         """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost or stopped."""
-        if self._commands.would_have_beaten_since(at.lost_s, command):
+        if self._commands.would_have_beaten_since(at.lost_s, at.now_s, command):
             return None
         beat = f"heartbeat = {command.heartbeat} as when the master was lost, or another one switched it off"
-        text = f"enable refused: {beat}: write another value with it"
-        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.ENABLE, text)
+        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, bit, f"{what} refused: {beat}: write another value with it")
 
     def _tare(self, command: Command, state: State, at: Situation) -> EdgeRefusal | None:
         why = self._forbids_tare(command, state, at)

@@ -11,7 +11,7 @@ next one.
 from math import inf, nan
 
 from gateway.registers.command import NO_BEAT, NO_CHANNEL, Channel
-from gateway.registers.writes.ownership import FrameBeats, keep_latest
+from gateway.registers.writes.ownership import LONGEST_CYCLE_S, FrameBeats, keep_latest
 
 
 class Lease:
@@ -25,11 +25,8 @@ class Lease:
         self._started_s = -inf
         self._frames, self._refused = FrameBeats(), FrameBeats()
         self._master = ""  # who has the lease
+        self._stopped_s: dict[str, float] = {}  # when each master has switched the output off last
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
-
-    def adopt(self, heartbeat: int) -> None:
-        """Take over a value without counting it as a beat: the bank itself zeroed the command block."""
-        self._heartbeat = heartbeat
 
     def observe(self, now_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL) -> None:
         """Note the time of a heartbeat that this master has changed, in its frame of this channel."""
@@ -84,10 +81,12 @@ class Lease:
 
     def stop(self, now_s: float, who: str) -> None:
         """Let no beat of before count of any other master that has beaten within one length: this one has switched the output
-        off. Nor of itself where it has not: of two programs on one host that hung one may write 0, and the other 1."""
+        off. Its own count for one length, as long as a cycle may bring the next frame: of two programs on one host that hung
+        one may write 0, and the other 1."""
         for other, (heartbeat, beaten_s) in self._beats.items():
-            if (other != who) is self.is_within(beaten_s, now_s):
+            if other != who and self.is_within(beaten_s, now_s):
                 self._beats[other] = heartbeat, nan
+        keep_latest(self._stopped_s, who, now_s)
 
     def let_no_beat_count(self) -> None:
         """Let no beat of before count, whose ever: the output goes off, and nobody has asked for that just now."""
@@ -130,11 +129,16 @@ class Lease:
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
     def would_have_beaten_since(
-        self, since_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL
+        self, since_s: float, now_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL
     ) -> bool:
-        """Return whether this master has beaten since then, were this value observed now; always true without a lease."""
-        beaten_s = self._beats[who][1] if who in self._beats else self._changed_s
-        return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who, channel)
+        """Return whether this master has beaten since then, and right behind its own stop within one length, were this value
+        observed now; always true without a lease."""
+        if self._length_s is None or self._is_beat(heartbeat, who, channel):
+            return True
+        if who not in self._beats:
+            return self._changed_s >= since_s
+        beaten_s, is_stopped = self._beats[who][1], now_s - self._stopped_s.get(who, -inf) < LONGEST_CYCLE_S
+        return beaten_s >= since_s and (self.is_within(beaten_s, now_s) or not is_stopped)
 
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
         """Return what `is_fresh_since` would, were this value observed now: any master's, for a reset presses nothing."""

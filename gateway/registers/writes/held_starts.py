@@ -12,9 +12,8 @@ from typing import Final, NamedTuple
 
 from gateway import defaults
 from gateway.registers.command import NO_BEAT, Channel
-from gateway.registers.writes.ownership import FrameBeats, keep_latest
+from gateway.registers.writes.ownership import LONGEST_CYCLE_S, FrameBeats, keep_latest
 
-_CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
 _TOLD_S: Final = 1.0  # from one time that the next process is told to another
 _DOWN_S: Final = 10.0  # that a start may take, in which nobody can write
@@ -101,7 +100,7 @@ class LastTares:
         if host not in self._last:
             return False
         beat, tared_s = self._last[host]
-        return now_s - tared_s < _CYCLE_S if heartbeat is None else heartbeat == beat
+        return now_s - tared_s < LONGEST_CYCLE_S if heartbeat is None else heartbeat == beat
 
     def knows(self, host: str) -> bool:
         """Decide whether this host has tared, and has not gone on since."""
@@ -220,12 +219,12 @@ class HeldEnables:
         was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
         is over."""
         if host in self.lost and (frame.heartbeat is None or not self._is_there(host, frame.heartbeat, frame.channel)):
-            if now_s - self._let_go_s.get(host, inf) < _CYCLE_S:
+            if now_s - self._let_go_s.get(host, inf) < LONGEST_CYCLE_S:
                 return True
             self._find(host)
         if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
             return False
-        if now_s - refused.at_s >= (_CYCLE_S if refused.is_let_go else _HELD_S):
+        if now_s - refused.at_s >= (LONGEST_CYCLE_S if refused.is_let_go else _HELD_S):
             del self._refused[host]
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat

@@ -23,6 +23,9 @@ LARGEST_SERIAL_PLACE: Final = 255
 MOST_KNOWN: Final = 64
 """Masters that anything is known of: memory stays bounded whoever writes."""
 
+LONGEST_CYCLE_S: Final = 0.8
+"""In which a program that writes in cycles comes again; a person needs longer to want the same once more."""
+
 _SERIAL: Final = "serial:"
 _Key = TypeVar("_Key")
 _Kept = TypeVar("_Kept")

@@ -36,12 +36,11 @@ def test_without_a_lease_nobody_is_lost() -> None:
     assert not lease.is_lost(1e6, False) and lease.is_fresh_since(1e6, 2e6)
 
 
-def test_only_another_heartbeat_renews_it_and_none_that_the_bank_has_zeroed() -> None:
+def test_only_another_heartbeat_renews_it() -> None:
     lease = Lease(0.5)
     lease.observe(10.0, 7)
     lease.observe(10.4, 7)
     assert lease.age_s(10.5) == 0.5
-    lease.adopt(0)
     lease.observe(10.6, 0, channel=NO_BEAT)
     assert lease.age_s(11.0) == 1.0
     lease.observe(10.8, 7)
@@ -57,8 +56,8 @@ def test_a_frame_that_is_sent_on_and_on_is_no_beat_behind_what_another_master_ha
     lease.observe(10.2, 4711, *page)
     lease.observe(10.4, 7, *plc)
     assert lease.age_s(11.0) == pytest.approx(0.8)
-    assert not lease.would_have_beaten_since(10.1, 7, *plc)
-    assert lease.would_have_beaten_since(10.1, 8, *plc) and lease.would_have_beaten_since(10.1, 4711, *page)
+    assert not lease.would_have_beaten_since(10.1, 10.5, 7, *plc)
+    assert lease.would_have_beaten_since(10.1, 10.5, 8, *plc) and lease.would_have_beaten_since(10.1, 10.5, 4711, *page)
     lease.observe(10.6, 4712, *page)
     assert lease.age_s(11.0) == pytest.approx(0.4)
 
@@ -67,8 +66,8 @@ def test_the_masters_that_are_remembered_are_bounded_and_the_oldest_is_forgotten
     lease = Lease(0.5)
     for number in range(100):
         lease.observe(float(number), number + 1, *block_of(str(number)))
-    assert lease.would_have_beaten_since(99.5, 1, *block_of("0")), "whoever is not known begins anew"
-    assert not lease.would_have_beaten_since(99.5, 99, *block_of("98"))
+    assert lease.would_have_beaten_since(99.5, 99.9, 1, *block_of("0")), "whoever is not known begins anew"
+    assert not lease.would_have_beaten_since(99.5, 99.9, 99, *block_of("98"))
 
 
 @pytest.mark.parametrize(
@@ -104,8 +103,8 @@ def test_of_many_masters_those_are_known_that_have_beaten_last() -> None:
         )  # who has the lease all the while, and hangs then
     lease.observe(100.0, 7, *block_of("10.0.0.9"))
     for beat, who in ((2063, "10.0.0.1"), (1062, "10.0.1.62"), (7, "10.0.0.9")):
-        assert not lease.would_have_beaten_since(200.0, beat, *block_of(who)), who
-    assert lease.would_have_beaten_since(200.0, 1000, *block_of("10.0.1.0")), "who has been forgotten"
+        assert not lease.would_have_beaten_since(200.0, 200.0, beat, *block_of(who)), who
+    assert lease.would_have_beaten_since(200.0, 200.0, 1000, *block_of("10.0.1.0")), "who has been forgotten"
 
 
 def test_who_has_beaten_since_its_last_takeover_has_a_lease_of_its_own_at_the_next() -> None:

@@ -11,7 +11,7 @@ from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
 from tests.service.running_rig.masters.drawn_scene import LEASE_S, Scene
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, RESET, TAKE, TARE, SmallRig
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, RESET, TAKE, TARE, SmallRig
 
 SEEDS, STEPS, CYCLE_S = (7, 44, 100, 130), 20, 0.05
 PAGE, TWIN = Peer("web"), Peer(OTHER.host, OTHER.port + 1)
@@ -139,3 +139,49 @@ def test_a_tare_of_a_program_that_hung_is_taken_by_no_process_behind_it() -> Non
     rig = begun(kept)
     answers = flow(rig, 5, lambda _: rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER))
     assert all(refused for (refused,) in answers)
+
+
+@pytest.mark.parametrize("zeros", [(0, 0), (0, 0, 0), (0, 0, 0, 0, 0, 0)])
+def test_a_run_of_a_program_that_hung_begins_not_anew_behind_the_zeros_of_another_one(zeros: tuple[int, ...]) -> None:
+    """Each of them ended it, and the next frame began it again: a start of the ladder in each cycle."""
+    rig = begun()
+    answers = flow(
+        rig,
+        40,
+        lambda _: rig.answer(*zeros, peer=OTHER),
+        lambda cycle: rig.answer(0, CALIBRATE, 0, 0, 0, min(cycle, 3)),
+    )
+    assert [bool(refused) for _, refused in answers] == [cycle > 3 for cycle in range(40)]
+    assert rig.answer(0, CALIBRATE, 0, 0, 0, 4) is None, "its program goes on"
+
+
+def test_of_two_programs_on_one_host_one_that_has_just_hung_begins_nothing_behind_its_lease() -> None:
+    """The other's 0 came within the lease, and no loss was seen: it pressed once more, and its lease began anew."""
+    rig = begun()
+    flow(rig, 2, lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle, peer=OTHER))
+    rig.run(LEASE_S - 2 * CYCLE_S).write(0, 0, peer=TWIN)
+    rig.run(2 * CYCLE_S)
+    answers = flow(rig, 40, lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 1, peer=OTHER))
+    assert all(refused for (refused,) in answers) and rig.state is State.OFF
+
+
+def test_who_beats_only_while_it_presses_presses_again_behind_its_own_0() -> None:
+    rig = begun()
+    flow(rig, 4, lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle))
+    rig.write(0, 0)
+    rig.run(1.0).write(0, ENABLE, 1200)
+    assert rig.run(CYCLE_S).state is not State.OFF
+
+
+def test_a_master_that_toggles_begins_between_the_stops_of_another_one() -> None:
+    """Its 0 right behind a stop was taken for the bank's own zeroing, and each second one of its heartbeats was none."""
+    rig = begun()
+    answers = flow(
+        rig,
+        8,
+        lambda cycle: rig.answer(0, ENABLE, 300, 0, 0, 100 + cycle, peer=OTHER),
+        lambda cycle: rig.answer(0, 0, 0, peer=OTHER),
+        lambda cycle: rig.answer(4, cycle % 2),
+        lambda cycle: rig.answer(0, ENABLE, 1200),
+    )
+    assert not any(word for *_, word in answers[2:])
