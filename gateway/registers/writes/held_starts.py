@@ -81,26 +81,28 @@ class _Refused(NamedTuple):
 
 
 class LastTares:
-    """The heartbeat that stood at each host's last tare, taken or refused, and when that was, s: of a program that stands still
-    the same one comes on and on, and whatever lies on the tool by then would become the zero. Who has written another
-    heartbeat since, or the bit as 0, goes on. has_lease: a heartbeat has to change; else none is noted."""
+    """The heartbeat that stood at each host's last tare, taken or refused, when that was, s, and whether somebody on that host
+    has written the bit as 0 since: of a program that stands still the same one comes on and on, and whatever lies on the tool
+    by then would become the zero. Who has written another heartbeat since goes on, and who has written the bit as 0, behind a
+    cycle: a program beside it may hang. has_lease: a heartbeat has to change; else none is noted."""
 
     def __init__(self, *, has_lease: bool = True) -> None:
         self._has_lease, self._frames = has_lease, FrameBeats()
-        self._last: dict[str, tuple[int, float]] = {}
+        self._last: dict[str, tuple[int, float, bool]] = {}
 
     def note(self, host: str, heartbeat: int, now_s: float) -> None:
         """Note a tare, and the heartbeat that came with it, or else stood."""
         if self._has_lease:
-            keep_latest(self._last, host, (heartbeat, now_s))
+            keep_latest(self._last, host, (heartbeat, now_s, False))
 
     def repeats(self, host: str, heartbeat: int | None, now_s: float) -> bool:
         """Decide whether this host has brought this heartbeat with its last tare; None: one that brings none comes as often as
         only a cycle does."""
         if host not in self._last:
             return False
-        beat, tared_s = self._last[host]
-        return now_s - tared_s < LONGEST_CYCLE_S if heartbeat is None else heartbeat == beat
+        beat, tared_s, is_let_go = self._last[host]
+        is_soon = now_s - tared_s < LONGEST_CYCLE_S
+        return is_soon if heartbeat is None else heartbeat == beat and (is_soon or not is_let_go)
 
     def knows(self, host: str) -> bool:
         """Decide whether this host has tared, and has not gone on since."""
@@ -108,12 +110,13 @@ class LastTares:
 
     def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note a heartbeat of a host."""
-        if self._frames.note(channel, heartbeat) and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
-            self.let_go(host)
+        if self._frames.note(channel, heartbeat) and host in self._last and self._last[host][0] != heartbeat:
+            del self._last[host]
 
-    def let_go(self, host: str, now_s: float = 0.0) -> None:
+    def let_go(self, host: str, now_s: float) -> None:
         """Note that a host has written the bit as 0."""
-        self._last.pop(host, None)
+        if host in self._last:
+            self._last[host] = *self._last[host][:2], True
 
 
 class HeldEnables:
@@ -226,6 +229,7 @@ class HeldEnables:
             return False
         if now_s - refused.at_s >= (LONGEST_CYCLE_S if refused.is_let_go else _HELD_S):
             del self._refused[host]
+            self._miss_no_more(host)
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
@@ -267,15 +271,16 @@ class HeldEnables:
         if (host in self.lost or host in self._lost_now) and self._is_there(host, heartbeat, channel):
             self._find(host)
 
-    def let_go(self, host: str, now_s: float = -inf) -> None:
+    def let_go(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 0. What was refused, and comes again as soon as only a cycle does, is of a
-        program beside the one that wrote this."""
+        program beside the one that wrote this: it is missed in the next process, too."""
         if host in self.lost:
             self._let_go_s[host] = now_s
-        self._miss_no_more(host)
         self._forget(host)
         if refused := self._refused.get(host):
             self._refused[host] = refused._replace(is_let_go=True)
+        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
+            self._miss_no_more(host)
 
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""

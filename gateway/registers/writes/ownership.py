@@ -105,25 +105,21 @@ class FrameBeats:
         self._last: dict[Channel, int] = {}
 
     def has_brought(self, channel: Channel, heartbeat: int) -> bool:
-        """Decide whether this is what the frame has brought last: by another connection, where it is the first on this one."""
-        return self._last_of(channel) == heartbeat
+        """Decide whether this is what the frame has brought last, by this connection or by whichever."""
+        return heartbeat in (self._last.get(channel), self._last_alike(channel))
 
     def has_changed(self, channel: Channel, heartbeat: int) -> bool:
         """Decide whether the frame has brought another one last. Its first proves nothing."""
-        return self._last_of(channel) not in (None, heartbeat)
+        return self.knows_alike(channel) and not self.has_brought(channel, heartbeat)
 
     def knows_alike(self, channel: Channel) -> bool:
         """Decide whether the frame has come before, by whichever connection."""
-        return self._last_of(channel) is not None
+        return self._last_alike(channel) is not None
 
     def moves(self, channel: Channel, heartbeat: int) -> bool:
         """Decide whether a program goes on that brings this: of a connection's first frame a heartbeat counts that none of its
         host's frames has brought."""
         return self.has_changed(channel, heartbeat) and (channel in self._last or heartbeat not in self.of(channel[0]))
-
-    def _last_of(self, channel: Channel) -> int | None:
-        last = self._last.get(channel)
-        return self._last_alike(channel) if last is None else last
 
     def _last_alike(self, channel: Channel) -> int | None:
         """Return what a host's last frame to these words has brought: a program that hung may connect anew for each frame."""

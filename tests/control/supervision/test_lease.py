@@ -132,3 +132,11 @@ def test_a_frame_moves_with_its_second_heartbeat_and_one_that_was_started_anew_h
         assert lease.has_moved is has_moved
     lease.start(0.5, "a")
     assert not lease.has_moved
+
+
+def test_of_a_master_with_two_connections_the_last_heartbeat_is_none_once_more_by_the_other_one() -> None:
+    """That one had brought the heartbeat before it last."""
+    lease, here, there = Lease(0.5), ("a", "a", 4001, 4, 2), ("a", "a", 4002, 4, 2)
+    for now_s, heartbeat, channel in ((10.0, 7, here), (10.1, 8, there), (10.2, 9, here), (10.3, 9, there)):
+        lease.observe(now_s, heartbeat, "a", channel)
+    assert lease.age_s(10.4) == pytest.approx(0.2)

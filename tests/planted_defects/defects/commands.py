@@ -40,7 +40,7 @@ DEFECTS = (
            "        else:\n            del self._refused[host]\n", "        del self._refused[host]\n",
            ("service/running_rig/masters/test_frames_side_by_side.py",)),
     Defect("the tare of a program that hung is taken where it brings no heartbeat", "registers/writes/held_starts.py",
-           "return now_s - tared_s < LONGEST_CYCLE_S if heartbeat is None else heartbeat == beat", "return heartbeat == beat",
+           "return is_soon if heartbeat is None else heartbeat == beat and", "return heartbeat == beat and",
            ("service/running_rig/masters/test_refused_starts.py",)),
     Defect("a tare is refused for a heartbeat of long ago", "registers/writes/held_starts.py",
            " and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:", " and False:",

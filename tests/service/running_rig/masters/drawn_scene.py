@@ -108,6 +108,8 @@ class Scene:
         again = SmallRig(
             self.control, is_restarted=how != "end", needs_proof=self.needs_proof, began_s=rig.now(), seed=self.seed
         )
+        for program in self.programs:
+            program.stale = 0  # of what each has brought the new process knows what was told last, and no more
         self.moved_s = {host: moved_s + again.now() - rig.now() for host, moved_s in self.moved_s.items()}
         self.begin_process(beats if how == "death" else None, again)
 
@@ -208,9 +210,14 @@ class Scene:
         state, owner, accepted = rig.loop.decision.state, rig.bank.owner, rig.loop.decision.force_accepted_n
         refused = program.write(rig, frame, program.peer())
         is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
-        is_begun = is_begun and not rig.controller.active_run.is_local
+        is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken
+        is_begun = is_begun and not is_local
         is_run = state is not State.CALIBRATING and rig.loop.decision.state is State.CALIBRATING and is_begun
-        rises = rig.loop.decision.state in PRESSING and rig.loop.decision.force_accepted_n > accepted + COUNT
+        rises = (
+            not is_local
+            and rig.loop.decision.state in PRESSING
+            and rig.loop.decision.force_accepted_n > accepted + COUNT
+        )
         takes = rig.bank.owner == host and owner not in (None, host)
         tares = (
             refused is None

@@ -185,3 +185,25 @@ def test_a_master_that_toggles_begins_between_the_stops_of_another_one() -> None
         lambda cycle: rig.answer(0, ENABLE, 1200),
     )
     assert not any(word for *_, word in answers[2:])
+
+
+@pytest.mark.parametrize("word", [CALIBRATE, ENABLE])
+def test_beside_zeros_of_its_own_host_a_program_that_hung_begins_nothing_in_the_next_process(word: int) -> None:
+    """Each 0 had its host missed no more: what was refused in one process, the next one took."""
+    kept: dict[str, Any] = {}
+    rig = begun(kept)
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    flow(rig, 10, lambda _: rig.answer(0, word, 0, 0, 0, 7, peer=OTHER), lambda _: rig.answer(0, 0, peer=TWIN))
+    rig = begun(kept)
+    answers = flow(rig, 10, lambda _: rig.answer(0, word, 0, 0, 0, 7, peer=OTHER))
+    assert all(refused for (refused,) in answers)
+
+
+def test_beside_zeros_of_its_own_host_a_tare_of_a_program_that_hung_is_taken_once() -> None:
+    rig = begun()
+    frame = lambda _: rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER)  # noqa: E731
+    answers = flow(rig, 40, frame, lambda _: rig.answer(0, 0, peer=TWIN))
+    assert [tare is None for tare, _ in answers] == [cycle == 0 for cycle in range(40)]
+    rig.run(0.8)
+    assert frame(0) is None, "who has written 0 and waited means it"
