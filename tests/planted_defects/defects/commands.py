@@ -43,7 +43,7 @@ DEFECTS = (
            "return is_soon if heartbeat is None else heartbeat == beat and", "return heartbeat == beat and",
            ("service/running_rig/masters/test_refused_starts.py",)),
     Defect("a tare is refused for a heartbeat of long ago", "registers/writes/held_starts.py",
-           " and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:", " and False:",
+           " and host in self._last and self._last[host][0] != heartbeat:", " and False:",
            ("service/running_rig/masters/test_refused_starts.py",)),
     Defect("who was taken over from presses in the next process", "registers/writes/admission.py",
            "if asked & TAKE and self._ownership.owner != write.host:", "if False:",
