@@ -62,6 +62,7 @@ def _read_and_write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int)
 
 
 _BLOCK = _words(0, "word", "force", "", "", "beat")
+_WORD_AND_FORCE, _FLOATS = _words(0, "word", "force"), _floats(200, "word", "force")
 _BEAT, _WORD, _FORCE = _words(4, "beat"), _words(0, "word"), _words(1, "force")
 _FORCE_AND_BEAT = _words(1, "force", "", "", "beat")
 PROOF_AT = MAP.find("byte_order_echo").address
@@ -69,19 +70,22 @@ SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "block": (_BLOCK,),
     "block, beat": (_BLOCK, _BEAT),
     "beat, block": (_BEAT, _BLOCK),
-    "word and force, beat": (_words(0, "word", "force"), _BEAT),
+    "word and force, beat": (_WORD_AND_FORCE, _BEAT),
     "force, word, beat": (_FORCE, _WORD, _BEAT),
     "beat, force, word": (_BEAT, _FORCE, _WORD),
     "word, force, beat": (_WORD, _FORCE, _BEAT),
     "force and beat, word": (_FORCE_AND_BEAT, _WORD),
     "floats": (_floats(200, "word", "force", "", "", "beat"),),
     "float force and beat, word": (_floats(202, "force", "", "", "beat"), _WORD),
-    "floats, beat": (_floats(200, "word", "force"), _BEAT),
+    "floats, beat": (_FLOATS, _BEAT),
     "force and beat, coils": (_FORCE_AND_BEAT, _coils),
     "force and beat, coil": (_FORCE_AND_BEAT, _enable_coil),
     "mask, force and beat": (_mask, _FORCE_AND_BEAT),
     "read and write": (_read_and_write,),
 }
+
+SILENT = {_WORD, _FORCE, _coils, _enable_coil, _mask, _WORD_AND_FORCE, _FLOATS}
+"""Frames without a heartbeat."""
 
 
 def zeros_by_each_function(rig: SmallRig, peer: Peer) -> dict[str, Callable[[], None]]:
@@ -122,12 +126,13 @@ class Program:
         self._rests = draw.choice((None, ZEROS))
         self.takes_if_told, self.resets = draw.random() < 0.6, draw.random() < 0.5
         self.refused: list[RefusalReason] = []
+        self.beat_at, self.is_stale = 0, False
         self.stale = self.held = self.cycles = 0
 
     def begin_anew(self) -> None:
         """Forget what it was told."""
         self.stale = self.held = self.cycles = 0
-        self.refused = []
+        self.refused, self.is_stale = [], False
 
     def __str__(self) -> str:
         return (
@@ -175,7 +180,7 @@ class Program:
         if not self.is_live:
             return
         before, refused, self.refused = self.asks, self.refused, []
-        self.stale = self.stale + 1 if RefusalReason.HEARTBEAT_STALE in refused else 0
+        self.stale, self.is_stale = self.stale + 1 if self.is_stale else 0, False
         self.held = self.held + 1 if RefusalReason.CALIBRATION_HELD in refused else self.held
         self.cycles += 1
         self.asks = self._obeyed(before, refused) if self.wants else self._rests
@@ -199,13 +204,17 @@ class Program:
             return self.wants[0] | TAKE, self.wants[1]
         return self.wants
 
-    def write(self, rig: SmallRig, frame: Frame, peer: Peer) -> Refusal | None:
-        """Send a frame, and the proof of the byte order where that is told."""
+    def write(self, rig: SmallRig, frame: Frame, peer: Peer, number: int, stopped_at: int) -> Refusal | None:
+        """Send a frame, and the proof of the byte order where that is told. number: of this write; stopped_at: of the last one
+        by which another host has switched the output off."""
         assert self.asks
+        if frame not in SILENT:
+            self.beat_at = number
         try:
             frame(rig, peer, *self.asks, self._beat)
         except Refusal as refusal:
             self.refused.append(refusal.reason)
+            self.is_stale |= refusal.reason is RefusalReason.HEARTBEAT_STALE and stopped_at < self.beat_at
             if refusal.reason is RefusalReason.BYTE_ORDER_UNPROVEN and self.is_live:
                 rig.bank.write_registers(PROOF_AT, pack(">f", 1234.5), peer)
             return refusal

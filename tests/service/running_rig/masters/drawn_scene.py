@@ -1,6 +1,4 @@
-"""A rig with programs on two hosts, some of which hang, and people, as a seed draws them, through deaths, ends and power cuts;
-and the laws for them, written without code of the product's.
-"""
+"""A rig with programs on two hosts, some of which hang, and with people, as a seed draws them: deaths, ends, power cuts."""
 
 from dataclasses import replace
 from math import inf
@@ -17,7 +15,8 @@ from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover, left_of
 from tests.control.bench import settings
 from tests.control.valve.valve_bench import SHARE
-from tests.service.running_rig.masters.drawn_programs import Frame, Program, zeros_by_each_function
+from tests.service.running_rig.masters.drawn_laws import LEASE_S, PRESSING, Laws
+from tests.service.running_rig.masters.drawn_programs import Program, zeros_by_each_function
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,
     ENABLE,
@@ -30,8 +29,7 @@ from tests.service.running_rig.simulated_rig import (
     SmallRig,
 )
 
-LEASE_S, PAGE = 0.35, Peer("web")
-PRESSING = State.RAMPING, State.HOLDING, State.READY, State.CALIBRATING
+PAGE = Peer("web")
 HAPPENINGS = (
     *("hang",) * 4,
     *("go on",) * 2,
@@ -39,14 +37,10 @@ HAPPENINGS = (
     *("rest", "zeros", "0 here", "0 here", "reset here", "stop", "reset", "5 N", "take", "tare", "run here"),
     *("cell", "cell", "output", "death", "death", "end", "power cut"),
 )
-COUNT = 0.011
-MOST_STALE = 2
-"""Cycles in a row in which a program whose heartbeat moves may be told that it stands still."""
-DOWN_S = 2.0
 
 
-class Scene:
-    """Draws and judges."""
+class Scene(Laws):
+    """Draws; the laws judge."""
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
@@ -59,7 +53,7 @@ class Scene:
         )
         self.needs_proof = draw.random() < 0.2
         hosts = draw.sample(("10.0.0.5", "10.0.0.6", "plc"), draw.choice((1, 2)))
-        self.programs: list[Program] = []
+        super().__init__()
         for place, host in enumerate(host for host in hosts for _ in range(draw.choice((1, 1, 2)))):
             program = Program(draw, host, place)
             while any(other.identity == program.identity and program.is_like(other) for other in self.programs):
@@ -67,12 +61,6 @@ class Scene:
             self.programs.append(program)
         self.kept, self.left = dict[str, Any](), dict[str, Any]()
         self.told = [f"{seed}: {self.control.supervision.lease_action.name}, {', '.join(map(str, self.programs))}"]
-        self.moved_s: dict[str, float] = {}  # by something that was meant just then, not by a frame that flows
-        self.begun_s: dict[str, float] = {}
-        self.excused: dict[str, float] = {}  # until when the frames of a host may begin, for nobody knows who had hung
-        self.tared: set[str] = set()
-        self.zero_s: dict[str, float] = {}
-        self.ownerless_s: float | None = None
         self.rig = SmallRig(self.control, needs_proof=self.needs_proof)
         self.begin_process(None, self.rig)
 
@@ -109,7 +97,7 @@ class Scene:
             self.control, is_restarted=how != "end", needs_proof=self.needs_proof, began_s=rig.now(), seed=self.seed
         )
         for program in self.programs:
-            program.stale = 0  # of what each has brought the new process knows what was told last, and no more
+            program.begin_anew()  # of what each has brought the new process knows what was told last, and no more
         self.moved_s = {host: moved_s + again.now() - rig.now() for host, moved_s in self.moved_s.items()}
         self.begin_process(beats if how == "death" else None, again)
 
@@ -179,10 +167,6 @@ class Scene:
         self.zero_s[host] = rig.now()
         self.answer(ways[way])
 
-    def meant(self, host: str) -> None:
-        self.moved_s[host] = self.rig.now()
-        self.tared.discard(host)
-
     def answer(self, act: Any) -> None:
         try:
             act()
@@ -199,77 +183,6 @@ class Scene:
         rig.run(TICK_S)
         self.last_told = rig.bank.owner, rig.loop.owner_beats
         self.judge_presence()
-
-    def send(self, program: Program, frame: Frame) -> None:
-        rig, host, now_s = self.rig, program.identity, self.rig.now()
-        asks = program.asks
-        if asks is None:
-            return
-        if round(program.moved_s / TICK_S) == rig.ticks:
-            self.meant(host)
-        state, owner, accepted = rig.loop.decision.state, rig.bank.owner, rig.loop.decision.force_accepted_n
-        refused = program.write(rig, frame, program.peer())
-        is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
-        is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken
-        is_begun = is_begun and not is_local
-        is_run = state is not State.CALIBRATING and rig.loop.decision.state is State.CALIBRATING and is_begun
-        rises = (
-            not is_local
-            and rig.loop.decision.state in PRESSING
-            and rig.loop.decision.force_accepted_n > accepted + COUNT
-        )
-        takes = rig.bank.owner == host and owner not in (None, host)
-        tares = (
-            refused is None
-            and bool(asks[0] & TARE)
-            and rig.bank.command.peer == host
-            and bool(int(rig.bank.command.control_word) & TARE)
-        )
-        about = f"{program} {asks}: {'; '.join(self.told[-14:])}"
-        self.note_sent(program, asks, refused)
-        if is_begun or is_run or takes:
-            self.begun_s[host] = now_s
-        is_hung = not any(p.is_live and p.asks for p in self.programs if p.identity == host) and (
-            now_s - self.moved_s.get(host, -99.0)
-            > max(LEASE_S, *(p.period * TICK_S for p in self.programs if p.identity == host)) + TICK_S
-        )
-        if is_hung:
-            if host in self.excused and (is_begun or is_run or takes or rises or tares):
-                self.excused[host] = min(self.excused[host], now_s + LEASE_S)
-            if now_s > self.excused.get(host, -99.0):
-                assert not is_begun, f"hung begins: {about}"
-                assert not is_run, f"hung begins a run: {about}"
-                is_begun_now = now_s - self.begun_s.get(host, -99.0) <= LEASE_S
-                assert not rises or is_begun_now, f"hung raises: {about}"
-                assert not takes, f"hung takes over: {about}"
-                assert not (tares and host in self.tared), f"hung tares again: {about}"
-        if tares:
-            self.tared.add(host)
-        if program.is_honest and program.cycles > 1:
-            assert program.stale <= MOST_STALE, f"honest is told stale: {about}"
-            assert program.held <= 2, f"honest is told held: {about}"
-
-    def note_sent(self, program: Program, asks: tuple[int, int], refused: Refusal | None) -> None:
-        what = f"{self.programs.index(program)} {asks} {refused.reason.name if refused else 'taken'}"
-        if what not in (told.partition(" ")[2] for told in self.told[-3:]):
-            self.told.append(f"{self.rig.now():.2f} {what}")
-
-    # -- who presses?
-
-    def judge_presence(self) -> None:
-        rig, now_s = self.rig, self.rig.now()
-        if rig.loop.decision.state not in PRESSING or rig.controller.active_run.is_local:
-            self.ownerless_s = None
-            return
-        owner = rig.bank.owner
-        about = f"{owner}: {'; '.join(self.told[-14:])}"
-        if owner is None:
-            self.ownerless_s = now_s if self.ownerless_s is None else self.ownerless_s
-            is_held = self.control.supervision.lease_action is LeaseAction.HOLD
-            assert is_held or now_s - self.ownerless_s < DOWN_S, f"pressed for nobody {about}"
-            return
-        self.ownerless_s, since_s = None, max(self.moved_s.get(owner, -99.0), self.begun_s.get(owner, -99.0))
-        assert now_s - since_s < LEASE_S + DOWN_S, f"presses without a beat {about}"
 
     # -- the end
 
