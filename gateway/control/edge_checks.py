@@ -250,11 +250,11 @@ def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
 
 def _repeated(command: Command, edges: Edges) -> EdgeRefusal | None:
     """Why nothing begins, and nobody takes over, by a frame that comes on and on, and has been refused, or was there before the
-    restart: its program may stand still."""
+    restart: its program may stand still. A reset begins nothing."""
     if not command.repeats:
         return None
     beat = f"{command.peer} has written no other heartbeat than with what was refused, or before the restart: write one"
-    return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges, beat)
+    return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges._replace(rises=edges.rises & ~_RESET), beat)
 
 
 def _refuse_any_rise(reason: RefusalReason, edges: Edges, why: str) -> EdgeRefusal | None:

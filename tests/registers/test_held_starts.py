@@ -23,7 +23,6 @@ def refused(beat: int = 7) -> HeldEnables:
         (frame(7), True),
         (frame(7, b"\0\0"), True),  # another setpoint, by a program that stands still in another place
         (StartFrame((*CHANNEL[:3], 1, 2), (1, b"\0\0"), 7), True),  # in another frame of its
-        (frame(8), True),  # word for word the same, but for what the host's heartbeat register says
         (frame(8, b"\0\0"), False),
         (frame(None, b"\0\0"), True),  # of who beats, a frame without one tells nothing
         (frame(7, takes=True), True),  # its setpoint was out of range, which hid that it takes over

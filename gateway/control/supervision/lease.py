@@ -11,7 +11,8 @@ next one.
 from math import inf, nan
 
 from gateway.registers.command import NO_BEAT, NO_CHANNEL, Channel
-from gateway.registers.writes.ownership import LONGEST_CYCLE_S, FrameBeats, keep_latest
+from gateway.registers.writes.frame_beats import LONGEST_CYCLE_S, FrameBeats
+from gateway.registers.writes.ownership import keep_latest
 
 
 class Lease:
@@ -20,7 +21,7 @@ class Lease:
     def __init__(self, length_s: float | None) -> None:
         self._length_s = length_s
         self._heartbeat = 0
-        self._changed_s = self._moved_s = self._heard_s = -inf  # heard: a master that does not own
+        self._changed_s = self._moved_s = self._heard_s = -inf  # heard: in what was refused
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
         self._frames, self._refused = FrameBeats(), FrameBeats()
@@ -36,13 +37,13 @@ class Lease:
                 self._moved_s = now_s
             self._unbeaten.pop(who, None)
             keep_latest(self._beats, who, (heartbeat, now_s))
-        self._heartbeat = heartbeat
-        self._note(channel, heartbeat)
+        self.pass_over(heartbeat, channel)
 
     def pass_over(self, heartbeat: int, channel: Channel) -> None:
         """Take over a value of this channel's frame without counting it as a beat."""
         self._heartbeat = heartbeat
-        self._note(channel, heartbeat)
+        if channel != NO_BEAT:
+            self._frames.put(channel, heartbeat)
 
     def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
         """Whether a frame brings another heartbeat than before, or as its first none that stands, or is its master's last."""
@@ -52,17 +53,13 @@ class Lease:
         return not is_known or self._frames.has_changed(channel, heartbeat)
 
     def hear_refused(self, now_s: float, heartbeat: int, who: str, channel: Channel) -> None:
-        """Note the heartbeat of a master that does not own: it renews nothing, but where it changes its program goes on."""
+        """Note the heartbeat of a write that was refused: it renews nothing, but where it changes its program goes on."""
         frames = self._frames if self._frames.knows_alike(channel) else self._refused
         if frames.moves(channel, heartbeat):
             keep_latest(self._beats, who, (heartbeat, now_s))
             self._unbeaten.pop(who, None)
             self._heard_s = now_s
-        frames.note(channel, heartbeat)
-
-    def _note(self, channel: Channel, heartbeat: int) -> None:
-        if channel != NO_BEAT:
-            self._frames.note(channel, heartbeat)
+        frames.put(channel, heartbeat)
 
     def beats_of(self, who: str | None) -> list[int]:
         """Return the heartbeats that stand in the latest frames of this master."""

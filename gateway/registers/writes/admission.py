@@ -31,7 +31,8 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, LastTares, StartFrame
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, StartFrame
+from gateway.registers.writes.last_tares import LastTares
 from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
@@ -42,6 +43,7 @@ STARTS: Final = ENABLE | int(RUN_BITS)
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
 _BUSY: Final = (RefusalReason.NOT_OWNER, RefusalReason.CALIBRATING, RefusalReason.STOPPING)
+_BEHIND_HEARTBEAT: Final = 2 * HEARTBEAT + 1  # bytes
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
 
 
@@ -51,11 +53,10 @@ class Admission:
 
     def __init__(self, commands: CommandBlock, ownership: Ownership, echo: ByteOrderEcho, rules: BankRules) -> None:
         self.decide: Decide = decide_nothing
-        self.follow_repeated: Callable[[], None] = lambda: None
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
-        self._last_tares = LastTares(has_lease=rules.has_lease)
+        self._last_tares = LastTares(self.held_enables.frames, has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -63,10 +64,10 @@ class Admission:
 
     def admit(self, write: Write, number: int, now_s: float) -> AdmittedWrite | None:
         """Return what a write becomes; None when it is somebody else's stop and there is nothing to stop. Raises Refusal."""
-        self.follow_repeated()
         try:
             return self._admit(write, number, now_s)
         except Refusal as refusal:
+            self.held_enables.follow()
             self._note_refused(write, refusal.reason, now_s)
             raise
 
@@ -79,8 +80,9 @@ class Admission:
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
             command = commands.command(values, asked, number, now_s, self._sender(write))
             self._ask(command, values, write)
-            self.held_enables.follow(command.channel, heartbeat)
+            self.held_enables.follow_later(command)
             return AdmittedWrite(values, asked, command, False, False, 0, True)
+        self.held_enables.follow()
         permitted = self._permit(write, values, now_s)
         if permitted is None:
             self._hear(write, asked, heartbeat, now_s)
@@ -99,13 +101,12 @@ class Admission:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
-        repeats = not self._is_in_use(write.host) and self.held_enables.repeats(
-            write.host, self._frame(write, values, written), now_s
-        )
+        frame = self._frame(write, values, written)
+        repeats = not self._is_in_use(write.host) and self.held_enables.repeats(write.host, frame, now_s)
         command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)
-        self._check_tare(command, word_at, brings_beat=HEARTBEAT in self._offsets(write))
+        self._check_tare(command, word_at, frame)
         self._check_starts(command, word_at)
         self._hear(write, asked, heartbeat, now_s)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
@@ -116,9 +117,7 @@ class Admission:
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
-        if int(admitted.command.control_word) & TARE:
-            self._note_tare(admitted.command.peer, admitted.command.heartbeat, admitted.command.received_s)
+        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
@@ -177,7 +176,9 @@ class Admission:
 
     def _sender(self, write: Write, *, is_guest: bool = False) -> tuple[str, Channel]:
         """Return who writes, and the channel of a heartbeat that is taken."""
-        return write.host, _channel(write) if HEARTBEAT in self._offsets(write) and not is_guest else NO_BEAT
+        is_block = write.address == self._commands.first and len(write.data) > _BEHIND_HEARTBEAT  # the commonest
+        brings_beat = not is_guest and (is_block or HEARTBEAT in self._offsets(write))
+        return write.host, _channel(write) if brings_beat else NO_BEAT
 
     def _offsets(self, write: Write) -> range:
         """Return which words of the command block are written whole."""
@@ -208,7 +209,7 @@ class Admission:
 
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
-        may allow."""
+        may allow. Nothing of it is taken but that its program goes on, and of who does not own which bits are kept at 1."""
         if reason is RefusalReason.BYTE_ORDER_UNPROVEN and not self.held_enables.has_beaten(write.host):
             return  # a person's own proof is waited for
         offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])
@@ -217,35 +218,33 @@ class Admission:
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
             frame, asks = self._frame(write, values, word), bool(word & (STARTS | TAKE))
-            if reason is RefusalReason.TARE_REFUSED:
-                self._note_tare(write.host, int(values[HEARTBEAT]), now_s)
-        if reason is RefusalReason.NOT_OWNER:
-            self._hear_guest(write, frame, word, now_s)
+        if frame.heartbeat is not None and not write.peer.is_behind:
+            self.held_enables.on_refused_beat(now_s, frame.heartbeat, write.host, frame.channel)
+        if reason is RefusalReason.NOT_OWNER and CONTROL_WORD in offsets:
+            self.held_runs.keep(write.host, self._held_by(write, word, word))
+            if write.touched & ~word & ENABLE:
+                self.held_enables.let_go(write.host, now_s)
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
             self.held_enables.note_refused_beat(write.host, frame)
-
-    def _hear_guest(self, write: Write, frame: StartFrame, word: int, now_s: float) -> None:
-        """Of who does not own nothing is taken but that its program goes on, and does not keep enable at 1."""
-        if frame.heartbeat is not None:
-            self.held_enables.on_refused_beat(now_s, frame.heartbeat, write.host, frame.channel)
-        if CONTROL_WORD in self._offsets(write) and write.touched & ~word & ENABLE:
-            self.held_enables.let_go(write.host, now_s)
+        if reason is RefusalReason.TARE_REFUSED:
+            self._note_tare(write.host, frame.channel, standing if frame.heartbeat is None else frame.heartbeat, now_s)
 
     def _hear(self, write: Write, asked: int, heartbeat: int, now_s: float) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
             self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
-        offsets = self._offsets(write)
-        for held, bit in ((self.held_enables, ENABLE), (self._last_tares, TARE)):
-            if not held.knows(write.host):
-                continue
-            if HEARTBEAT in offsets:
-                held.hear(write.host, heartbeat, _channel(write))
-            if CONTROL_WORD in offsets and write.touched & ~asked & bit:
-                held.let_go(write.host, now_s)
+        offsets, enables = self._offsets(write), self.held_enables
+        zeros = write.touched & ~asked if CONTROL_WORD in offsets else 0
+        is_known = enables.knows(write.host)
         if HEARTBEAT in offsets:
-            self.held_enables.follow(_channel(write), heartbeat)
+            enables.hear(write.host, heartbeat, _channel(write))
+        if is_known and zeros & ENABLE:
+            enables.let_go(write.host, now_s)
+        if asked & TARE:
+            self._note_tare(write.host, _channel(write), heartbeat, now_s)
+        elif zeros & TARE and self._last_tares.knows(write.host):
+            self._last_tares.let_go(write.host)
 
     # -- why not
 
@@ -277,18 +276,18 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _note_tare(self, host: str, heartbeat: int, now_s: float) -> None:
+    def _note_tare(self, host: str, channel: Channel, heartbeat: int, now_s: float) -> None:
         """By the same frame of a program that hangs the next process takes no tare either."""
-        self._last_tares.note(host, heartbeat, now_s)
+        self._last_tares.note(host, channel, now_s)
         if self.held_enables.has_beaten(host):
             self.held_enables.note_lost(host, heartbeat)
 
-    def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
+    def _check_tare(self, command: Command, word_at: int, frame: StartFrame) -> None:
         host, beat, now_s = command.peer, command.heartbeat, command.received_s
         if not int(command.control_word) & TARE:
             return
-        if self._last_tares.repeats(host, beat if brings_beat else None, now_s):
-            self._note_tare(host, beat, now_s)
+        if self._last_tares.repeats(host, frame, now_s):
+            self._note_tare(host, frame.channel, beat, now_s)
             text = f"tare refused: heartbeat = {beat} as at its last one: write another value with it"
             raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 

@@ -30,14 +30,13 @@ class RepeatedWrite:
 
     def __init__(self, admission: Admission, commands: CommandBlock, ownership: Ownership) -> None:
         self._admission, self._commands, self._ownership = admission, commands, ownership
-        admission.follow_repeated = self.follow
         self.note(b"", NOBODY, Command(), ())
 
     def note(self, data: bytes, peer: Peer, command: Command, names: Sequence[str]) -> None:
         """Note a plain write of the words from the first on that was accepted: what it became, which registers it set."""
         before = data[:_BEFORE] if len(data) > _BEFORE else None  # without a heartbeat nothing repeats it
         self._last = before, data[_BEHIND:], peer, names, self._ownership.owner, self._commands.fields
-        self._command, self._is_ahead = command, False
+        self._command = command
 
     def take(self, data: bytes, peer: Peer, current: Command, now: Callable[[], float]) -> Command | None:
         """Store these words from the first on, and return what they become; None, and nothing is stored, where they do not
@@ -60,18 +59,11 @@ class RepeatedWrite:
         command = _new(Command, values)
         if self._admission.decide(_new(ProposedWrite, (command, tuple))):
             return None
-        if values[_AT_CHANNEL] != current.channel:
-            self.follow()
+        self._admission.held_enables.follow_later(command)
         if heartbeat != current.heartbeat:
             self._commands.store_heartbeat(heartbeat)
-        self._command, self._is_ahead = command, True
+        self._command = command
         return command
-
-    def follow(self) -> None:
-        """Have the heartbeat of the last write that was taken here known: of a cycle's only the last one is asked for."""
-        if self._is_ahead:
-            self._admission.held_enables.follow(self._command.channel, self._command.heartbeat)
-            self._is_ahead = False
 
     @property
     def names(self) -> Sequence[str]:

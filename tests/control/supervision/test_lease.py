@@ -119,7 +119,7 @@ def test_who_has_beaten_since_its_last_takeover_has_a_lease_of_its_own_at_the_ne
 
 
 def test_a_frame_moves_with_its_second_heartbeat_and_one_that_was_started_anew_has_to_move_again() -> None:
-    lease, block, word = Lease(1.0), ("a", 4001, 0, 26), ("a", 4001, 4, 2)
+    lease, block, word = Lease(1.0), ("a", "a", 4001, 0, 26), ("a", "a", 4001, 4, 2)
     lease.observe(0.0, 7, "a", block)
     lease.start(0.0, "a")
     for now_s, heartbeat, channel, has_moved in (
@@ -140,3 +140,12 @@ def test_of_a_master_with_two_connections_the_last_heartbeat_is_none_once_more_b
     for now_s, heartbeat, channel in ((10.0, 7, here), (10.1, 8, there), (10.2, 9, here), (10.3, 9, there)):
         lease.observe(now_s, heartbeat, "a", channel)
     assert lease.age_s(10.4) == pytest.approx(0.2)
+
+
+def test_a_master_s_last_heartbeat_is_none_once_more_in_a_frame_that_comes_for_the_first_time() -> None:
+    """Another one's stands by then."""
+    lease = Lease(0.5)
+    lease.observe(10.0, 7, *block_of("plc"))
+    lease.observe(10.2, 4711, *block_of("page"))
+    lease.observe(10.4, 7, "plc", ("plc", "plc", 4001, 4, 2))
+    assert lease.age_s(11.0) == pytest.approx(0.8)

@@ -10,16 +10,24 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
-from tests.service.running_rig.masters.drawn_scene import LEASE_S, Scene
+from tests.service.running_rig.masters.drawn_laws import LEASE_S
+from tests.service.running_rig.masters.drawn_scene import Scene
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, RESET, TAKE, TARE, SmallRig
 
-SEEDS, STEPS, CYCLE_S = (7, 44, 100, 130), 20, 0.05
+SEEDS = (
+    *(7, 44, 59, 100, 130, 171, 180, 200, 209, 211),
+    *(6068, 6115, 6129, 6166, 6198, 6205, 6223, 6259, 6278),
+    *(7002, 7012, 7034, 7078, 7180, 7244, 7278, 7293),
+    *(20265, 20323, 20431),
+)
+"""What hung began so, or what went on was refused so, once."""
+STEPS, CYCLE_S = 20, 0.05
 PAGE, TWIN = Peer("web"), Peer(OTHER.host, OTHER.port + 1)
 
 
 @pytest.mark.parametrize("first", SEEDS)
 def test_what_hangs_begins_nothing_and_what_goes_on_has_its_force(first: int, budget: int) -> None:
-    for seed in range(first, first + budget):
+    for seed in (first, *range(100000 + 100 * first, 100000 + 100 * first + budget - 1)):
         scene = Scene(seed)
         scene.play(STEPS)
         assert scene.rig.trace
@@ -207,3 +215,67 @@ def test_beside_zeros_of_its_own_host_a_tare_of_a_program_that_hung_is_taken_onc
     assert [tare is None for tare, _ in answers] == [cycle == 0 for cycle in range(40)]
     rig.run(0.8)
     assert frame(0) is None, "who has written 0 and waited means it"
+
+
+def test_beside_a_program_that_hung_on_its_own_host_a_living_one_presses_and_resets() -> None:
+    """Its word brings no heartbeat, and that of its other frame was forgotten with each refusal of the hung one."""
+    rig = SmallRig(settings(lease_s=LEASE_S)).faulted()
+    rig.beats = False
+
+    def beat(cycle: int) -> Refusal | None:
+        return rig.answer(1, 0 if rig.state is State.FAULT else 900, 0, 0, cycle % 2, peer=OTHER)
+
+    def word(_: int) -> Refusal | None:
+        return rig.answer(0, RESET if rig.state is State.FAULT else ENABLE, peer=OTHER)
+
+    answers = flow(rig, 12, lambda _: rig.answer(0, ENABLE | TAKE, 0, 0, 0, 9, peer=TWIN), word, beat)
+    assert rig.state in (State.RAMPING, State.HOLDING) and not any(told for _, told, _ in answers[4:])
+
+
+def test_beside_an_owner_a_tare_counts_again_whose_heartbeat_is_refused_for_that_owner() -> None:
+    rig = begun()
+    flow(rig, 2, lambda cycle: rig.answer(4, cycle, peer=OTHER), lambda _: rig.answer(0, TARE, peer=OTHER))
+    rig.write(1, 500)
+    flow(rig, 2, lambda cycle: rig.answer(4, 5 + cycle, peer=OTHER))
+    assert rig.answer(0, TAKE | TARE, peer=OTHER) is None
+
+
+def test_two_programs_of_one_host_tare_beside_each_other_as_often_as_their_heartbeat_moves() -> None:
+    rig = begun()
+    answers = flow(
+        rig,
+        10,
+        lambda cycle: rig.answer(4, cycle, peer=TWIN),
+        lambda cycle: rig.answer(0, TARE, 0, 0, 0, 100 + cycle, peer=OTHER),
+        lambda _: rig.answer(0, TARE, peer=TWIN),
+    )
+    assert not any(refused for answer in answers[2:] for refused in answer)
+
+
+def test_who_was_taken_over_from_while_its_takeover_was_refused_takes_nothing_back_when_it_hangs() -> None:
+    """Of its two frames one was refused for another reason, and was no takeover: with the other one it took over."""
+    rig = begun()
+    force_and_beat = lambda _: rig.answer(1, 1200, 0, 0, 7, peer=OTHER)  # noqa: E731
+    word = lambda _: rig.answer(0, ENABLE | TAKE, peer=OTHER)  # noqa: E731
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    flow(rig, 4, lambda cycle: rig.answer(1, 1200, 0, 0, 3 + cycle, peer=OTHER), word)
+    rig.is_cell_silent = False
+    flow(rig, 4, force_and_beat, word)
+    rig.write(0, ENABLE | TAKE, 500, 0, 0, 4711)
+    flow(rig, 4, force_and_beat, word)
+    assert rig.bank.owner != OTHER.host
+
+
+def test_a_fault_is_reset_by_a_master_that_toggles_and_is_refused_for_another_reason_in_each_second_cycle() -> None:
+    """Of its two values the one that came beside a latched fault was not heard, and the other one was the same each time."""
+    rig = SmallRig(settings(lease_s=LEASE_S)).faulted()
+    rig.write(4, 0, peer=OTHER)
+    rig.run(1.0).write(1, 500, peer=PAGE)
+    words = ENABLE, ENABLE | TAKE, RESET, RESET | TAKE
+    answers = [
+        rig.run(CYCLE_S).answer(0, word, 0, 0, 0, 1 - cycle % 2, 0, peer=OTHER)
+        for cycle, word in enumerate((*words, *words[:2], *words[:2], *words))
+        if rig.state is State.FAULT
+    ]
+    assert rig.state is State.OFF, answers
