@@ -76,3 +76,17 @@ def test_a_run_that_was_refused_over_a_fault_holds_up_no_enable_behind_its_reset
         else:
             master.write(0, int(ENABLE))
             assert bank.command.control_word == ENABLE
+
+
+def test_a_start_that_was_refused_counts_again_behind_a_heartbeat_that_came_with_a_refused_tare(make_bank, master_of):
+    bank = make_bank(has_lease=True)
+    master = master_of(bank, "10.0.0.1")
+    master.write(4, 1)
+    bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
+    assert master.refusal(master.write, 0, int(ENABLE)).reason is RefusalReason.NOT_READY
+    bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
+    for beat in (2, 3):
+        assert master.refusal(master.write, 0, TARE, 0, 0, 0, beat).reason is RefusalReason.TARE_REFUSED
+    bank.on_asked = lambda write: None
+    master.write(0, int(ENABLE))
+    assert not bank.command.repeats
