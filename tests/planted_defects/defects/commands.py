@@ -3,6 +3,15 @@
 from tests.planted_defects.defects.defect import Defect
 
 DEFECTS = (
+    Defect("a hung program begins its run anew behind another one's zeros", "control/edge_checks.py",
+           "            if state not in ENABLED_STATES:\n                yield", "            if False:\n                yield",
+           ("service/running_rig/masters/test_drawn_programs.py",)),
+    Defect("of two programs on one host that hung one begins behind the other's 0", "control/supervision/lease.py",
+           "and (self.is_within(beaten_s, now_s) or not is_stopped)", "",
+           ("service/running_rig/masters/test_drawn_programs.py",)),
+    Defect("of two programs on one host the tare of one is the other's", "registers/writes/last_tares.py",
+           "tared = of_frame(self._last[host], frame.channel) or self._latest(host)", "tared = self._latest(host)",
+           ("service/running_rig/masters/test_drawn_programs.py",)),
     Defect("the frame of a program that has just hung undoes another one's stop", "control/command_edges.py",
            "            self._lease.stop(now_s, command.peer)\n", "            pass\n",
            ("service/running_rig/masters/test_lost_masters.py",)),
