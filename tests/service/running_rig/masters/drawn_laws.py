@@ -15,8 +15,8 @@ PRESSING = State.RAMPING, State.HOLDING, State.READY, State.CALIBRATING
 COUNT = 0.011
 MOST_STALE = 2
 """Cycles in a row in which a program whose heartbeat moves may be told that it stands still. Not counted is one in which
-another host has switched the output off between its heartbeat and its start: the frames of a program that has just hung are
-the same, and nothing of that one begins behind a stop."""
+another host has switched the output off, or anybody has ended a run, between its heartbeat and its start: the frames of a
+program that has just hung are the same, and nothing of that one begins behind a stop. There safety wins."""
 DOWN_S = 2.0
 
 
@@ -56,7 +56,7 @@ class Laws:
         stopped_at = max((at for other, at in self.stopped_at.items() if other != host), default=-1)
         refused = program.write(rig, frame, program.peer(), self.writes, stopped_at)
         if state in PRESSING and rig.loop.decision.state not in PRESSING:
-            self.stopped_at[host] = self.writes
+            self.stopped_at["" if state is State.CALIBRATING else host] = self.writes
         is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
         is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken
         is_begun = is_begun and not is_local
