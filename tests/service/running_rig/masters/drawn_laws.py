@@ -7,8 +7,8 @@ goes on is told that it stands still in no more than two cycles in a row, and th
 from gateway.control import ControlSettings, LeaseAction
 from gateway.registers import Refusal
 from gateway.registers.words import State
-from tests.service.running_rig.masters.drawn_programs import Frame, Program
-from tests.service.running_rig.simulated_rig import TARE, TICK_S, SmallRig
+from tests.service.running_rig.masters.drawn_programs import RUN_COIL_AND_ENABLE_COIL, Frame, Program
+from tests.service.running_rig.simulated_rig import ENABLE, TARE, TICK_S, SmallRig
 
 LEASE_S = 0.35
 PRESSING = State.RAMPING, State.HOLDING, State.READY, State.CALIBRATING
@@ -35,10 +35,8 @@ class Laws:
         self.tared: set[str] = set()
         self.zero_s: dict[str, float] = {}
         self.ownerless_s: float | None = None
-        self.writes, self.stopped_at = (
-            0,
-            dict[str, int](),
-        )  # of each host the write that has switched the output off last
+        self.writes = 0
+        self.stopped_at: dict[str, int] = {}  # of each host the write that has switched the output off last
 
     def meant(self, host: str) -> None:
         self.moved_s[host] = self.rig.now()
@@ -55,7 +53,8 @@ class Laws:
         self.writes += 1
         stopped_at = max((at for other, at in self.stopped_at.items() if other != host), default=-1)
         refused = program.write(rig, frame, program.peer(), self.writes, stopped_at)
-        if state in PRESSING and rig.loop.decision.state not in PRESSING:
+        is_begun_and_stopped = frame is RUN_COIL_AND_ENABLE_COIL and not asks[0] & ENABLE
+        if (state in PRESSING or is_begun_and_stopped) and rig.loop.decision.state not in PRESSING:
             self.stopped_at["" if state is State.CALIBRATING else host] = self.writes
         is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
         is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken

@@ -45,7 +45,7 @@ def _coils(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
     rig.bank.write_bits(0, [bool(word >> bit & 1) for bit in range(7)], peer)
 
 
-def _enable_coil(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
+def _each_coil(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
     for bit in reversed(BITS):  # a takeover first
         if bit == 0 or word >> bit & 1:
             rig.bank.write_bits(bit, [bool(word >> bit & 1)], peer)
@@ -79,12 +79,14 @@ SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "float force and beat, word": (_floats(202, "force", "", "", "beat"), _WORD),
     "floats, beat": (_FLOATS, _BEAT),
     "force and beat, coils": (_FORCE_AND_BEAT, _coils),
-    "force and beat, coil": (_FORCE_AND_BEAT, _enable_coil),
+    "force and beat, coil": (_FORCE_AND_BEAT, _each_coil),
     "mask, force and beat": (_mask, _FORCE_AND_BEAT),
     "read and write": (_read_and_write,),
 }
 
-SILENT = {_WORD, _FORCE, _coils, _enable_coil, _mask, _WORD_AND_FORCE, _FLOATS}
+RUN_COIL_AND_ENABLE_COIL = _each_coil
+"""Without enable its last one ends what the others have begun."""
+SILENT = {_WORD, _FORCE, _coils, _each_coil, _mask, _WORD_AND_FORCE, _FLOATS}
 """Frames without a heartbeat."""
 
 
