@@ -27,7 +27,8 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit
-from gateway.registers.writes.admission import EDGE_BITS, AdmittedWrite
+from gateway.registers.writes.admission import EDGE_BITS
+from gateway.registers.writes.admitted_write import AdmittedWrite
 from gateway.registers.writes.command_block import CONTROL_WORD, HEARTBEAT, NAMES, SEQUENCE, Values
 
 MOST_SERIES: Final = 1000

@@ -44,9 +44,8 @@ class CommandTracker:
         self.not_finite = ""
         self._word = 0
         self._lease = Lease(settings.supervision.lease_s)
-        self.beats_of = self._lease.beats_of
+        self.beats_of, self.hear_refused = self._lease.beats_of, self._lease.hear_refused
         self._settings = self._rig_settings = settings
-        self._adopt_heartbeat = False
         self._direction = 1.0
 
     def turn(self, direction: float) -> None:
@@ -61,10 +60,8 @@ class CommandTracker:
         self._update_demand()
 
     def expect_clearing(self) -> None:
-        """Note that the bank is asked to zero the command: no bit stands any more, and a heartbeat of 0 is its doing and not a
-        beat."""
+        """Note that the bank is asked to zero the command: no bit stands any more."""
         self._word = 0
-        self._adopt_heartbeat = True
 
     def edges_of(self, command: Command) -> Edges:
         """Return what changes in the control word with this command. Reset, tare and takeover act whenever they are written as
@@ -88,17 +85,13 @@ class CommandTracker:
         if self._manner is not None and not is_same_manner(command, self.command):
             self._manner = None
         self.command = command
-        if self._adopt_heartbeat:
-            self._adopt_heartbeat = False
-            if not command.control_word and not command.heartbeat:  # any other value is a master's
-                self._lease.adopt(command.heartbeat)
         if command.has_waited or command.repeats:
-            self._lease.adopt(command.heartbeat)
+            self._lease.pass_over(command.heartbeat, command.channel)
         else:
             self._lease.observe(now_s, command.heartbeat, command.peer, command.channel)
         if edges.rises & _TAKE:
             self._lease.take_over(now_s, command.peer)
-        if edges.stops:
+        if edges.stops or edges.falls & RUN_BITS:
             self._lease.stop(now_s, command.peer)
         self._wanted_kg = command.payload_kg if command.payload_kg > 0.0 else self._settings.defaults.payload_kg
         self._follow_payload(dt_s)
@@ -171,9 +164,9 @@ class CommandTracker:
         """Return the time since the lease was renewed, s."""
         return self._lease.age_s(now_s)
 
-    def would_have_beaten_since(self, since_s: float, command: Command) -> bool:
-        """Return whether the heartbeat has changed since then, however long ago, were this command taken now."""
-        return self._lease.would_have_beaten_since(since_s, command.heartbeat, command.peer, command.channel)
+    def would_have_beaten_since(self, since_s: float, now_s: float, command: Command) -> bool:
+        """Return whether the heartbeat of the master has changed since then, and lately, were this command taken now."""
+        return self._lease.would_have_beaten_since(since_s, now_s, command.heartbeat, command.peer, command.channel)
 
     def would_start_lease(self, command: Command) -> bool:
         """Return whether this command is a takeover with a lease of its own, were it taken now."""

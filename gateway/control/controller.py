@@ -3,9 +3,8 @@
 Order of a step: read the sample, obey the edges of the command, look for a first cause, then move the output. So a command
 that arrives with its own step acts in that step, and no voltage is decided after a fault was seen. Whether a command can be
 taken is asked before (`refusal_of`), by the bank inside the write; a step refuses nothing of it. An edge that cannot be
-taken and comes all the same is an internal error: the safe voltage and a latched INTERNAL.
-
-The controller asks its own parts and none of theirs: commands, conditioner, faults, contact, loop, run, machine.
+taken and comes all the same is an internal error: the safe voltage and a latched INTERNAL. The controller asks its own parts
+and none of theirs: commands, conditioner, faults, contact, loop, run, machine.
 """
 
 from gateway.codes.faults import FaultCode
@@ -67,6 +66,7 @@ class Controller:
         self._contact = ContactDetector(settings.defaults.contact_threshold_n)
         self._one_shot = OneShotEvents(settings.supervision.stuck_n)
         self._reading, self._line, self.beats_of = NO_READING, LineStatus(), self._commands.beats_of
+        self.hear_refused = self._commands.hear_refused
         self._last_s: float | None = None
         self._moved_by: LoopInputs | None = None  # what the force loop has just moved by
         parts = ControllerParts(self._commands, self._faults, self._one_shot, self._loop, self.active_run)

@@ -97,7 +97,7 @@ class EdgeCheck:
         commands, before = self._commands, self._commands.command
         if (
             at.held_n is None
-            or (commands.would_have_beaten_since(at.lost_s, command) and not command.repeats)
+            or (commands.would_have_beaten_since(at.lost_s, at.now_s, command) and not command.repeats)
             or commands.would_start_lease(command)
         ):
             return None
@@ -138,6 +138,8 @@ class EdgeCheck:
             if self._valve is not None and command.control_word & ControlBit.VALVE_PULL:  # it would turn under the run
                 yield _no_run(_reason_of(plan), f"valve_pull is 1, {_PUSHING}", plan)
             yield from _some(self.of_run(plan, _in(state, at)))
+            if state not in ENABLED_STATES:
+                yield from _some(self._repeated(command, at, _bit_of(plan), _name_of(plan)))
             if held := _setpoints(command):
                 yield _no_run(_reason_of(plan), f"{' and '.join(held)}: a run begins with setpoint 0", plan)
         if len(plans) > 1:
@@ -175,13 +177,14 @@ class EdgeCheck:
             return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.RESET_FAULT, text)
         return None
 
-    def _repeated(self, command: Command, at: Situation) -> EdgeRefusal | None:
+    def _repeated(
+        self, command: Command, at: Situation, bit: ControlBit = ControlBit.ENABLE, what: str = "enable"
+    ) -> EdgeRefusal | None:
         """A program that stands still, whose last frame is sent on and on, would press anew each time it is lost or stopped."""
-        if self._commands.would_have_beaten_since(at.lost_s, command):
+        if self._commands.would_have_beaten_since(at.lost_s, at.now_s, command):
             return None
         beat = f"heartbeat = {command.heartbeat} as when the master was lost, or another one switched it off"
-        text = f"enable refused: {beat}: write another value with it"
-        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, ControlBit.ENABLE, text)
+        return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, bit, f"{what} refused: {beat}: write another value with it")
 
     def _tare(self, command: Command, state: State, at: Situation) -> EdgeRefusal | None:
         why = self._forbids_tare(command, state, at)
@@ -247,11 +250,11 @@ def _old(command: Command, edges: Edges) -> EdgeRefusal | None:
 
 def _repeated(command: Command, edges: Edges) -> EdgeRefusal | None:
     """Why nothing begins, and nobody takes over, by a frame that comes on and on, and has been refused, or was there before the
-    restart: its program may stand still."""
+    restart: its program may stand still. A reset begins nothing."""
     if not command.repeats:
         return None
     beat = f"{command.peer} has written no other heartbeat than with what was refused, or before the restart: write one"
-    return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges, beat)
+    return _refuse_any_rise(RefusalReason.HEARTBEAT_STALE, edges._replace(rises=edges.rises & ~_RESET), beat)
 
 
 def _refuse_any_rise(reason: RefusalReason, edges: Edges, why: str) -> EdgeRefusal | None:

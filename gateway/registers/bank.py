@@ -35,7 +35,8 @@ from gateway.registers.status_block import StatusBlock
 from gateway.registers.upload.staging_block import NO_SLOT, StagingBlock
 from gateway.registers.words import ControlBit, State, StatusBit
 from gateway.registers.writes.accepted_sentence import accepted_sentence
-from gateway.registers.writes.admission import ALL_BITS, Admission, AdmittedWrite, OnWrite, Write
+from gateway.registers.writes.admission import Admission
+from gateway.registers.writes.admitted_write import ALL_BITS, AdmittedWrite, OnWrite, Write
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -66,8 +67,8 @@ class RegisterBank:
         self._writers, self._now, self.refusals = LastWriters(), now, 0  # refused since the start
         self.last_refusal: Refusal | None = None
         self.identity: Mapping[int, bytes] = build_identity(register_map.name, rules.rig_name)
-        self._roles = write_roles(register_map.blocks)
-        self._map, self._image = register_map, (image := RegisterImage(register_map))
+        self._roles, self._map = write_roles(register_map.blocks), register_map
+        self._image = image = RegisterImage(register_map)
         self._words, self._room, self.known_answers = memoryview(image.data), image.room, image.known_answers
         self._command_block, self._command_role = register_map.block("command"), self._roles["command"]
         self._commands = CommandBlock(register_map, rules, self._image)
@@ -231,8 +232,8 @@ class RegisterBank:
         lowered = self._commands.lower_force()
         if lowered is None:
             return ""
-        before_n, after_n = lowered
-        self._admission.lowered_from_n = requested_n = self.command.force_requested_n or before_n
+        (before_n, after_n), requested_n = lowered, self.command.force_requested_n or lowered[0]
+        self._admission.lowered_from_n = requested_n
         self._amend(force_setpoint_n=after_n, lowered_from_n=requested_n)
         allowed = f"calibration {calibration.number} allows no more"
         return f"W314 force_setpoint lowered from {before_n:.2f} N to {after_n:.2f} N: {allowed}"
@@ -285,8 +286,7 @@ class RegisterBank:
 
     def _write_command(self, block: Block, address: int, data: bytes, peer: Peer, touched: int = ALL_BITS) -> None:
         now_s, write = self._now(), Write(block, address, data, peer.identity, peer, touched)
-        admitted = self._admission.admit(write, self.command.number + 1, now_s)
-        if admitted is None:
+        if (admitted := self._admission.admit(write, self.command.number + 1, now_s)) is None:
             return
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)

@@ -14,6 +14,8 @@ _NO_BIT: Final = ControlBit(0)
 Channel: TypeAlias = tuple[str, str, int, int, int]
 """Identity, host, port, address and bytes of a write: a master that writes in cycles has one for each of its frames."""
 NO_CHANNEL: Final = ("", "", 0, 0, 0)
+NO_BEAT: Final = ("", "", 0, 0, 1)
+"""The channel of a write that brings no heartbeat, or of which none is taken: the one of its command is that which stood."""
 
 
 class Command(NamedTuple):

@@ -8,12 +8,10 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
 from gateway.control import CalibrationInUse, Controller
-from gateway.control.command_edges import CommandTracker
 from gateway.control.runs.ladder_stairs import CalibrationPlan
 from gateway.control.settings import LeaseAction
 from gateway.control.supervision.fault_detection import StopCause
 from gateway.control.transitions import ControllerParts, StepOutcome, Transitions
-from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, Mode, State
 from tests.control.bench import Bench, bsfm, settings
 
@@ -148,19 +146,6 @@ def test_each_wish_of_a_step_is_one_and_is_gone_with_the_next_step(wish: str) ->
     assert not machine.outcome.is_empty
     machine.begin_step()
     assert machine.outcome.is_empty and machine.outcome == StepOutcome()
-
-
-def test_an_enable_right_behind_a_clearing_is_a_sign_of_life_and_the_clearing_itself_none() -> None:
-    for control_word, heartbeat, age_s in (
-        (ControlBit.ENABLE, 0, 0.0),
-        (ControlBit(0), 0, 5.0),
-        (ControlBit(0), 4, 0.0),
-    ):
-        tracker = CommandTracker(settings(lease_s=1.0))
-        tracker.take(0.0, Command(heartbeat=3, number=1))
-        tracker.expect_clearing()
-        tracker.take(5.0, Command(control_word=control_word, heartbeat=heartbeat, number=2))
-        assert tracker.lease_age_s(5.0) == age_s
 
 
 def test_a_beat_behind_a_fault_in_off_where_nothing_was_left_to_clear_lets_a_reset_through() -> None:

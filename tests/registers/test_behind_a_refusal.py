@@ -30,10 +30,10 @@ def test_a_beat_that_came_with_a_refused_tare_is_one_while_a_force_is_held(make_
     assert bank.command.repeats, "with nothing held it is what the refused frame has brought"
 
 
-def test_a_start_with_the_heartbeat_of_another_frame_that_was_refused_behind_it_begins_nothing(
+def test_a_start_with_the_heartbeat_of_another_frame_that_was_refused_behind_it_counts_once(
     make_bank, master_of
 ) -> None:
-    """Of a program with a frame for its start and one for its tare: both stand still with the same heartbeat."""
+    """Of a program with a frame for its start and one for its tare: it has gone on since, and both may stand still by now."""
     bank = make_bank(has_lease=True)
     master = master_of(bank, "10.0.0.1")
     bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
@@ -41,8 +41,11 @@ def test_a_start_with_the_heartbeat_of_another_frame_that_was_refused_behind_it_
     assert master.refusal(master.write, 0, ENABLE, 1200, 0, 0, 2).reason is RefusalReason.NOT_READY
     bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
     assert master.refusal(master.write, 0, TARE, 0, 0, 0, 3).reason is RefusalReason.TARE_REFUSED
+    bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
+    assert master.refusal(master.write, 0, ENABLE, 1200, 0, 0, 3).reason is RefusalReason.NOT_READY
+    bank.on_asked = lambda write: None
     master.write(0, ENABLE, 1200, 0, 0, 3)
-    assert bank.command.repeats, "its tare had brought this heartbeat"
+    assert bank.command.repeats
     master.write(0, ENABLE, 1200, 0, 0, 4)
     assert not bank.command.repeats, "its program goes on"
 
@@ -73,3 +76,17 @@ def test_a_run_that_was_refused_over_a_fault_holds_up_no_enable_behind_its_reset
         else:
             master.write(0, int(ENABLE))
             assert bank.command.control_word == ENABLE
+
+
+def test_a_start_that_was_refused_counts_again_behind_a_heartbeat_that_came_with_a_refused_tare(make_bank, master_of):
+    bank = make_bank(has_lease=True)
+    master = master_of(bank, "10.0.0.1")
+    master.write(4, 1)
+    bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
+    assert master.refusal(master.write, 0, int(ENABLE)).reason is RefusalReason.NOT_READY
+    bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
+    for beat in (2, 3):
+        assert master.refusal(master.write, 0, TARE, 0, 0, 0, beat).reason is RefusalReason.TARE_REFUSED
+    bank.on_asked = lambda write: None
+    master.write(0, int(ENABLE))
+    assert not bank.command.repeats

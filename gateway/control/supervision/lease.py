@@ -10,8 +10,9 @@ next one.
 
 from math import inf, nan
 
-from gateway.registers.command import NO_CHANNEL, Channel
-from gateway.registers.writes.ownership import FrameBeats, keep_latest
+from gateway.registers.command import NO_BEAT, NO_CHANNEL, Channel
+from gateway.registers.writes.frame_beats import LONGEST_CYCLE_S, FrameBeats
+from gateway.registers.writes.ownership import keep_latest
 
 
 class Lease:
@@ -20,16 +21,13 @@ class Lease:
     def __init__(self, length_s: float | None) -> None:
         self._length_s = length_s
         self._heartbeat = 0
-        self._changed_s = self._moved_s = -inf
+        self._changed_s = self._moved_s = self._heard_s = -inf  # heard: in what was refused
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
-        self._frames = FrameBeats()
+        self._frames, self._refused = FrameBeats(), FrameBeats()
         self._master = ""  # who has the lease
+        self._stopped_s: dict[str, float] = {}  # when each master has switched the output off last
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
-
-    def adopt(self, heartbeat: int) -> None:
-        """Take over a value without counting it as a beat: the bank itself zeroed the command block."""
-        self._heartbeat = heartbeat
 
     def observe(self, now_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL) -> None:
         """Note the time of a heartbeat that this master has changed, in its frame of this channel."""
@@ -39,12 +37,29 @@ class Lease:
                 self._moved_s = now_s
             self._unbeaten.pop(who, None)
             keep_latest(self._beats, who, (heartbeat, now_s))
+        self.pass_over(heartbeat, channel)
+
+    def pass_over(self, heartbeat: int, channel: Channel) -> None:
+        """Take over a value of this channel's frame without counting it as a beat."""
         self._heartbeat = heartbeat
-        self._frames.note(channel, heartbeat)
+        if channel != NO_BEAT:
+            self._frames.put(channel, heartbeat)
 
     def _is_beat(self, heartbeat: int, who: str, channel: Channel) -> bool:
-        is_new = heartbeat != self._heartbeat and (who not in self._beats or heartbeat != self._beats[who][0])
-        return is_new and not self._frames.has_brought(channel, heartbeat)
+        """Whether a frame brings another heartbeat than before, or as its first none that stands, or is its master's last."""
+        if channel == NO_BEAT or self._frames.has_brought(channel, heartbeat):
+            return False
+        is_known = heartbeat == self._heartbeat or (who in self._beats and heartbeat == self._beats[who][0])
+        return not is_known or self._frames.has_changed(channel, heartbeat)
+
+    def hear_refused(self, now_s: float, heartbeat: int, who: str, channel: Channel) -> None:
+        """Note the heartbeat of a write that was refused: it renews nothing, but where it changes its program goes on."""
+        frames = self._frames if self._frames.knows_alike(channel) else self._refused
+        if frames.moves(channel, heartbeat):
+            keep_latest(self._beats, who, (heartbeat, now_s))
+            self._unbeaten.pop(who, None)
+            self._heard_s = now_s
+        frames.put(channel, heartbeat)
 
     def beats_of(self, who: str | None) -> list[int]:
         """Return the heartbeats that stand in the latest frames of this master."""
@@ -63,10 +78,12 @@ class Lease:
 
     def stop(self, now_s: float, who: str) -> None:
         """Let no beat of before count of any other master that has beaten within one length: this one has switched the output
-        off."""
+        off. Its own count for one length, as long as a cycle may bring the next frame: of two programs on one host that hung
+        one may write 0, and the other 1."""
         for other, (heartbeat, beaten_s) in self._beats.items():
             if other != who and self.is_within(beaten_s, now_s):
                 self._beats[other] = heartbeat, nan
+        keep_latest(self._stopped_s, who, now_s)
 
     def let_no_beat_count(self) -> None:
         """Let no beat of before count, whose ever: the output goes off, and nobody has asked for that just now."""
@@ -109,12 +126,18 @@ class Lease:
         return self._changed_s > since_s and now_s - self._changed_s <= self._length_s
 
     def would_have_beaten_since(
-        self, since_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL
+        self, since_s: float, now_s: float, heartbeat: int, who: str = "", channel: Channel = NO_CHANNEL
     ) -> bool:
-        """Return whether this master has beaten since then, were this value observed now; always true without a lease."""
-        beaten_s = self._beats[who][1] if who in self._beats else self._changed_s
-        return self._length_s is None or beaten_s >= since_s or self._is_beat(heartbeat, who, channel)
+        """Return whether this master has beaten since then, and right behind its own stop within one length, were this value
+        observed now; always true without a lease."""
+        if self._length_s is None or self._is_beat(heartbeat, who, channel):
+            return True
+        if who not in self._beats:
+            return self._changed_s >= since_s
+        beaten_s, is_stopped = self._beats[who][1], now_s - self._stopped_s.get(who, -inf) < LONGEST_CYCLE_S
+        return beaten_s >= since_s and (self.is_within(beaten_s, now_s) or not is_stopped)
 
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:
         """Return what `is_fresh_since` would, were this value observed now: any master's, for a reset presses nothing."""
-        return heartbeat != self._heartbeat or self.is_fresh_since(since_s, now_s)
+        is_heard = self._heard_s > since_s and self.is_within(self._heard_s, now_s)
+        return heartbeat != self._heartbeat or is_heard or self.is_fresh_since(since_s, now_s)

@@ -1,7 +1,8 @@
 """What an accepted write has changed, for the log."""
 
 from gateway.registers.words import ControlBit
-from gateway.registers.writes.admission import EDGE_BITS, TAKE, AdmittedWrite
+from gateway.registers.writes.admission import EDGE_BITS, TAKE
+from gateway.registers.writes.admitted_write import AdmittedWrite
 
 
 def accepted_sentence(changes: str, admitted: AdmittedWrite, owners: tuple[str | None, str | None]) -> str:

@@ -11,15 +11,14 @@ with it: taken for a stop alone, a guest's tare would be the end of the force, a
 
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Final, NamedTuple
+from typing import Final
 
 from gateway.codes.refusals import RefusalReason
-from gateway.modbus import Peer
-from gateway.registers.command import Channel, Command, Status
-from gateway.registers.map.register_map import Block
+from gateway.registers.command import NO_BEAT, Channel, Command, Status
 from gateway.registers.refusal import Refusal
 from gateway.registers.rig_rules import BankRules
 from gateway.registers.words import RUN_BITS, ControlBit, State
+from gateway.registers.writes.admitted_write import ALL_BITS, AdmittedWrite, PermittedWrite, Write
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.command_block import (
     CONTROL_WORD,
@@ -32,7 +31,8 @@ from gateway.registers.writes.command_block import (
     CommandBlock,
     Values,
 )
-from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, LastTares, StartFrame
+from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, StartFrame
+from gateway.registers.writes.last_tares import LastTares
 from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
@@ -42,51 +42,9 @@ TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
 STARTS: Final = ENABLE | int(RUN_BITS)
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
-ALL_BITS: Final = 0xFFFF
 _BUSY: Final = (RefusalReason.NOT_OWNER, RefusalReason.CALIBRATING, RefusalReason.STOPPING)
+_BEHIND_HEARTBEAT: Final = 2 * HEARTBEAT + 1  # bytes
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
-
-
-class Write(NamedTuple):
-    """A write of the command block. touched: bits of the control word that the master has named (coils name some)."""
-
-    block: Block
-    address: int
-    data: bytes
-    host: str
-    peer: Peer
-    touched: int = ALL_BITS
-
-    @property
-    def sender(self) -> tuple[str, Channel]:
-        """Return who writes, and by which channel."""
-        return self.host, (self.host, self.peer.host, self.peer.port, self.address, len(self.data))
-
-
-class AdmittedWrite(NamedTuple):
-    """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
-    output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that this host keeps at 1;
-    is_plain: no bit rises or falls."""
-
-    values: Values
-    kept: int
-    command: Command
-    is_stop: bool
-    is_taken_over: bool
-    held: int
-    is_plain: bool = False
-
-
-OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]], None]
-"""on_write(peer, values before, what was admitted, owner before and after) of each accepted write."""
-
-
-class _PermittedWrite(NamedTuple):
-    """What a write asks for, as far as its host may ask for it. written: its control word; is_stop: the output goes off."""
-
-    values: Values
-    written: int
-    is_stop: bool
 
 
 class Admission:
@@ -98,7 +56,7 @@ class Admission:
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
-        self._last_tares = LastTares(has_lease=rules.has_lease)
+        self._last_tares = LastTares(self.held_enables.frames, has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -109,6 +67,7 @@ class Admission:
         try:
             return self._admit(write, number, now_s)
         except Refusal as refusal:
+            self.held_enables.follow()
             self._note_refused(write, refusal.reason, now_s)
             raise
 
@@ -119,14 +78,17 @@ class Admission:
         if asked != before[CONTROL_WORD] or values[MODE] != before[MODE]:  # else they have been found good
             commands.check_known(values, write.block)
         if asked == before[CONTROL_WORD] and self._is_plain(write, asked):
-            command = commands.command(values, asked, number, now_s, write.sender)
+            command = commands.command(values, asked, number, now_s, self._sender(write))
             self._ask(command, values, write)
+            self.held_enables.follow_later(command)
             return AdmittedWrite(values, asked, command, False, False, 0, True)
+        self.held_enables.follow()
         permitted = self._permit(write, values, now_s)
         if permitted is None:
-            self._hear(write, asked, heartbeat)
+            self._hear(write, asked, heartbeat, now_s)
             self.held_runs.keep(write.host, self._held_by(write, asked, asked))
             return None
+        is_guest = permitted.values is not values
         values, written, is_stop = permitted
         if is_stop:
             values[FORCE_SETPOINT] = values[VOLTAGE_SETPOINT] = 0.0
@@ -134,20 +96,19 @@ class Admission:
         is_begun_anew = self._is_begun_anew(write.host, is_taken_over=is_taken_over)
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
-        command = commands.command(values, written, number, now_s, write.sender)
+        command = commands.command(values, written, number, now_s, self._sender(write, is_guest=is_guest))
         if is_stop:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
-        repeats = not self._is_in_use(write.host) and self.held_enables.repeats(
-            write.host, self._frame(write, values, written), now_s
-        )
+        frame = self._frame(write, values, written)
+        repeats = not self._is_in_use(write.host) and self.held_enables.repeats(write.host, frame, now_s)
         command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)
-        self._check_tare(command, word_at, brings_beat=HEARTBEAT in self._offsets(write))
+        self._check_tare(command, word_at, frame)
         self._check_starts(command, word_at)
-        self._hear(write, asked, heartbeat)
+        self._hear(write, asked, heartbeat, now_s)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
         return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
 
@@ -156,9 +117,7 @@ class Admission:
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
     def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered, whom it has stopped, and by which heartbeat it tared."""
-        if int(admitted.command.control_word) & TARE:
-            self._last_tares.note(admitted.command.peer, admitted.command.heartbeat, admitted.command.received_s)
+        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
         if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
             self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
         if admitted.held or self.held_runs.by_host:
@@ -185,7 +144,7 @@ class Admission:
         is_left = owner is None and former != host and bool(self._commands.values[CONTROL_WORD])
         return is_left or (is_taken_over and owner != host)
 
-    def _permit(self, write: Write, values: Values, now_s: float) -> _PermittedWrite | None:
+    def _permit(self, write: Write, values: Values, now_s: float) -> PermittedWrite | None:
         """Return what the owner may ask for, or anybody: a stop, the end of a run. None: nothing to stop. Raises Refusal."""
         commands = self._commands
         written, before = int(values[CONTROL_WORD]), int(commands.values[CONTROL_WORD])
@@ -194,12 +153,12 @@ class Admission:
         if not is_stop and self._is_named_stop(write, written):
             is_stop, written = True, written & ~RUN_BITS
         if self._ownership.admits(write.host) or (written & TAKE and self._ownership.may_take_over(write.host)):
-            return _PermittedWrite(values, written, is_stop)
+            return PermittedWrite(values, written, is_stop)
         asks_for_more = written & (EDGE_BITS | STARTS & ~before)  # than a stop or the end of a run, as anybody may
         if is_stop and not asks_for_more:
-            return _PermittedWrite(commands.values.copy(), 0, True)
+            return PermittedWrite(commands.values.copy(), 0, True)
         if falls & RUN_BITS and not asks_for_more:
-            return _PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
+            return PermittedWrite(commands.values.copy(), before & ~RUN_BITS, False)
         if not written and tuple(self._offsets(write)) == (CONTROL_WORD,):
             return None
         raise self._not_owner(write.address, write.host)
@@ -214,6 +173,12 @@ class Admission:
         if written & (ENABLE | EDGE_BITS) or tuple(self._offsets(write)) != (CONTROL_WORD,):
             return False
         return not write.touched & RUN_BITS or not (written | before) & RUN_BITS
+
+    def _sender(self, write: Write, *, is_guest: bool = False) -> tuple[str, Channel]:
+        """Return who writes, and the channel of a heartbeat that is taken."""
+        is_block = write.address == self._commands.first and len(write.data) > _BEHIND_HEARTBEAT  # the commonest
+        brings_beat = not is_guest and (is_block or HEARTBEAT in self._offsets(write))
+        return write.host, _channel(write) if brings_beat else NO_BEAT
 
     def _offsets(self, write: Write) -> range:
         """Return which words of the command block are written whole."""
@@ -240,35 +205,46 @@ class Admission:
 
     def _frame(self, write: Write, values: Values, word: int) -> StartFrame:
         beat = int(values[HEARTBEAT]) if HEARTBEAT in self._offsets(write) else None
-        return StartFrame(write.sender[1], (write.address, write.data), beat, bool(word & TAKE))
+        return StartFrame(_channel(write), (write.address, write.data), beat, bool(word & TAKE))
 
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
-        may allow."""
-        if reason is RefusalReason.BYTE_ORDER_UNPROVEN:
-            return  # its own proof is waited for
+        may allow. Nothing of it is taken but that its program goes on, and of who does not own which bits are kept at 1."""
+        if reason is RefusalReason.BYTE_ORDER_UNPROVEN and not self.held_enables.has_beaten(write.host):
+            return  # a person's own proof is waited for
         offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])
-        frame, asks = StartFrame(write.sender[1], (write.address, write.data)), CONTROL_WORD in offsets
+        frame, asks, word = StartFrame(_channel(write), (write.address, write.data)), CONTROL_WORD in offsets, ALL_BITS
         with suppress(Refusal):
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
-            frame, asks = self._frame(write, values, word), bool(word & STARTS)
-            if reason is RefusalReason.TARE_REFUSED:
-                self._last_tares.note(write.host, int(values[HEARTBEAT]), now_s)
+            frame, asks = self._frame(write, values, word), bool(word & (STARTS | TAKE))
+        if frame.heartbeat is not None and not write.peer.is_behind:
+            self.held_enables.on_refused_beat(now_s, frame.heartbeat, write.host, frame.channel)
+        if reason is RefusalReason.NOT_OWNER and CONTROL_WORD in offsets:
+            self.held_runs.keep(write.host, self._held_by(write, word, word))
+            if write.touched & ~word & ENABLE:
+                self.held_enables.let_go(write.host, now_s)
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
             self.held_enables.note_refused_beat(write.host, frame)
+        if reason is RefusalReason.TARE_REFUSED:
+            self._note_tare(write.host, frame.channel, standing if frame.heartbeat is None else frame.heartbeat, now_s)
 
-    def _hear(self, write: Write, asked: int, heartbeat: int) -> None:
+    def _hear(self, write: Write, asked: int, heartbeat: int, now_s: float) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
             self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
-        for held, bit in ((self.held_enables, ENABLE), (self._last_tares, TARE)):
-            offsets = self._offsets(write) if held.knows(write.host) else ()
-            if HEARTBEAT in offsets:
-                held.hear(write.host, heartbeat, write.sender[1])
-            if CONTROL_WORD in offsets and write.touched & ~asked & bit:
-                held.let_go(write.host)
+        offsets, enables = self._offsets(write), self.held_enables
+        zeros = write.touched & ~asked if CONTROL_WORD in offsets else 0
+        is_known = enables.knows(write.host)
+        if HEARTBEAT in offsets:
+            enables.hear(write.host, heartbeat, _channel(write))
+        if is_known and zeros & ENABLE:
+            enables.let_go(write.host, now_s)
+        if asked & TARE:
+            self._note_tare(write.host, _channel(write), heartbeat, now_s)
+        elif zeros & TARE and self._last_tares.knows(write.host):
+            self._last_tares.let_go(write.host)
 
     # -- why not
 
@@ -300,14 +276,18 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _check_tare(self, command: Command, word_at: int, *, brings_beat: bool) -> None:
+    def _note_tare(self, host: str, channel: Channel, heartbeat: int, now_s: float) -> None:
+        """By the same frame of a program that hangs the next process takes no tare either."""
+        self._last_tares.note(host, channel, now_s)
+        if self.held_enables.has_beaten(host):
+            self.held_enables.note_lost(host, heartbeat)
+
+    def _check_tare(self, command: Command, word_at: int, frame: StartFrame) -> None:
         host, beat, now_s = command.peer, command.heartbeat, command.received_s
         if not int(command.control_word) & TARE:
             return
-        if self._last_tares.repeats(host, beat if brings_beat else None, now_s):
-            self._last_tares.note(host, beat, now_s)
-            if brings_beat:
-                self.held_enables.note_lost(host, beat)
+        if self._last_tares.repeats(host, frame, now_s):
+            self._note_tare(host, frame.channel, beat, now_s)
             text = f"tare refused: heartbeat = {beat} as at its last one: write another value with it"
             raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 
@@ -328,3 +308,7 @@ class Admission:
             name = str(ControlBit(rises & STARTS & -(rises & STARTS)).name).lower()
             text = f"{name} refused: this rig wants 1234.5 in byte_order_echo first, in your client's word order"
             raise Refusal(RefusalReason.BYTE_ORDER_UNPROVEN, word_at, text, value=float(written))
+
+
+def _channel(write: Write) -> Channel:
+    return write.host, write.peer.host, write.peer.port, write.address, len(write.data)

@@ -7,13 +7,14 @@ on with the same heartbeat would begin when that reason is over, whatever its ot
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from typing import Final, NamedTuple
 
 from gateway import defaults
-from gateway.registers.command import Channel
-from gateway.registers.writes.ownership import FrameBeats, keep_latest
+from gateway.registers.command import NO_BEAT, Channel, Command
+from gateway.registers.writes.frame_beats import LONGEST_CYCLE_S, FrameBeats, of_frame
+from gateway.registers.writes.ownership import keep_latest
 
-_CYCLE_S: Final = 0.8  # of a cycle at the most; a person needs longer to want the same again
 _HELD_S: Final = 3.0  # longer than a cycle; who has waited for so long has looked, and decides anew
 _TOLD_S: Final = 1.0  # from one time that the next process is told to another
 _DOWN_S: Final = 10.0  # that a start may take, in which nobody can write
@@ -52,16 +53,24 @@ class StartFrame(NamedTuple):
     takes: bool = False
 
 
+class _Sent(NamedTuple):
+    """Where and what a frame has written. moves: how often any heartbeat had moved by then."""
+
+    data: tuple[int, bytes]
+    moves: int
+
+
 class _Refused(NamedTuple):
     """What was refused last of a host. heartbeat: its own, as far as it has brought one (`beats`), else the one that stood;
-    at_s: when it came last, s; sent: where and what each of its frames has written; is_let_go: somebody on that host has
-    written enable as 0 since."""
+    at_s: when it came last, s; sent: by each of its frames; moves: how often any heartbeat had moved by then; is_let_go:
+    somebody on that host has written enable as 0 since."""
 
     frame: StartFrame
     heartbeat: int
     beats: bool
     at_s: float
-    sent: Mapping[Channel, tuple[int, bytes]]
+    sent: dict[Channel, _Sent]
+    moves: int
     is_let_go: bool = False
 
     def is_same(self, frame: StartFrame) -> bool:
@@ -69,7 +78,7 @@ class _Refused(NamedTuple):
         another's. Who is refused because another one owns is told to take over: not by the same frame, of which nobody knows
         that it takes over where its setpoint was out of range."""
         if self.is_let_go:
-            return self.sent.get(frame.channel) == frame.data
+            return any(frame.data == sent.data for sent in self.sent.values())
         if frame.data == self.frame.data:
             return True
         if frame.takes and not self.frame.takes:
@@ -77,42 +86,6 @@ class _Refused(NamedTuple):
         if frame.heartbeat is None and self.beats:
             return True
         return frame.heartbeat == self.heartbeat
-
-
-class LastTares:
-    """The heartbeat that stood at each host's last tare, taken or refused, and when that was, s: of a program that stands still
-    the same one comes on and on, and whatever lies on the tool by then would become the zero. Who has written another
-    heartbeat since, or the bit as 0, goes on. has_lease: a heartbeat has to change; else none is noted."""
-
-    def __init__(self, *, has_lease: bool = True) -> None:
-        self._has_lease, self._frames = has_lease, FrameBeats()
-        self._last: dict[str, tuple[int, float]] = {}
-
-    def note(self, host: str, heartbeat: int, now_s: float) -> None:
-        """Note a tare, and the heartbeat that came with it, or else stood."""
-        if self._has_lease:
-            keep_latest(self._last, host, (heartbeat, now_s))
-
-    def repeats(self, host: str, heartbeat: int | None, now_s: float) -> bool:
-        """Decide whether this host has brought this heartbeat with its last tare; None: one that brings none comes as often as
-        only a cycle does."""
-        if host not in self._last:
-            return False
-        beat, tared_s = self._last[host]
-        return now_s - tared_s < _CYCLE_S if heartbeat is None else heartbeat == beat
-
-    def knows(self, host: str) -> bool:
-        """Decide whether this host has tared, and has not gone on since."""
-        return host in self._last
-
-    def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
-        """Note a heartbeat of a host."""
-        if self._frames.note(channel, heartbeat) and self._last.get(host, (heartbeat, 0.0))[0] != heartbeat:
-            self.let_go(host)
-
-    def let_go(self, host: str) -> None:
-        """Note that a host has written the bit as 0."""
-        self._last.pop(host, None)
 
 
 class HeldEnables:
@@ -126,12 +99,18 @@ class HeldEnables:
         self.on_change: Callable[[dict[str, float]], None] = lambda held: None
         self.on_lost: Callable[[dict[str, list[int]]], None] = lambda lost: None
         self.beats_of: Callable[[str | None], Sequence[int]] = lambda host: ()
+        self.on_refused_beat: Callable[[float, int, str, Channel], None] = lambda now_s, heartbeat, host, channel: None
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, list[int]] = {}
         self._lost_now: dict[str, list[int]] = {}
-        self._frames = FrameBeats()
+        self._let_go_s: dict[str, float] = {}  # when somebody on the host of one of the lost has written enable as 0
+        self.frames = FrameBeats()
         self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
+        self._ahead: Command | None = (
+            None  # whose heartbeat is noted later; is_moving: it was another one than in the one before
+        )
+        self._is_moving = False
 
     def note(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
@@ -145,7 +124,8 @@ class HeldEnables:
         """Note that a master is lost, that another one has stopped it, or that the gateway ends: by its last frame, sent on and
         on, the next process would press."""
         if host is not None and self._has_lease:
-            self._keep_lost(host, (*self._frames.of(host), *self.beats_of(host), heartbeat))
+            self.follow()
+            self._keep_lost(host, (*self.frames.of(host), *self.beats_of(host), heartbeat))
 
     def _keep_lost(self, host: str, beats: Sequence[int]) -> None:
         """Add to the heartbeats with which a host was lost: of a program with several frames each brings its own."""
@@ -160,43 +140,83 @@ class HeldEnables:
         if not self._has_lease:
             return
         before = self._refused.pop(host, None)
-        if before and self._is_same(before, frame):
+        if before and self._stands(host, frame, before.moves):
             frame = frame._replace(takes=frame.takes or before.frame.takes)  # one of its frames does
             if before.beats:
                 self.note_lost(host, before.heartbeat)
         beats = frame.heartbeat is not None
-        if frame.heartbeat is not None:
-            self._frames.note(frame.channel, frame.heartbeat)
+        self.note_refused_beat(host, frame)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
-        sent = {**(before.sent if before else {}), frame.channel: frame.data}
+        moves = self.frames.moves_so_far
+        sent = {**(before.sent if before else {}), frame.channel: _Sent(frame.data, moves)}
         few = dict(list(sent.items())[-defaults.MOST_FRAMES :])
-        keep_latest(self._refused, host, _Refused(frame, known, beats or bool(before and before.beats), now_s, few))
+        beats = beats or bool(before and before.beats)
+        keep_latest(self._refused, host, _Refused(frame, known, beats, now_s, few, moves))
 
-    def _is_same(self, refused: _Refused, frame: StartFrame) -> bool:
-        """Whether a frame brings nothing new, beside what was refused last or behind itself."""
-        is_as_before = frame.heartbeat is not None and self._frames.has_brought(frame.channel, frame.heartbeat)
+    def _is_same(self, host: str, refused: _Refused, frame: StartFrame) -> bool:
+        """Whether a frame brings nothing new, beside what was refused last or behind itself: no heartbeat of its host has moved
+        since it came last."""
+        sent = of_frame(refused.sent, frame.channel)
+        if not self._stands(host, frame, sent.moves if sent else refused.moves):
+            return False
+        is_as_before = frame.heartbeat is not None and self.frames.has_brought(frame.channel, frame.heartbeat)
         return refused.is_same(frame) or (
             is_as_before and not refused.is_let_go and (refused.frame.takes or not frame.takes)
         )
 
-    def note_refused_beat(self, host: str, frame: StartFrame) -> None:
-        """Note the heartbeat of a write that was refused and begins nothing, of a host whose start was refused."""
-        heartbeat = frame.heartbeat
-        if heartbeat is None or not self._frames.note(frame.channel, heartbeat):
+    def _stands(self, host: str, frame: StartFrame, moves: int) -> bool:
+        """Whether no heartbeat of a host has moved since so many had, nor does by this frame."""
+        is_moving = frame.heartbeat is not None and self.frames.moves(frame.channel, frame.heartbeat)
+        return not is_moving and not self.frames.has_moved_since(moves, host)
+
+    def follow_later(self, command: Command) -> None:
+        """Have noted what the frame of a command brings, of a host of which nothing is known, before it is asked for: of one
+        that comes again and again only the last heartbeat is, and whether it moved."""
+        ahead, channel = self._ahead, command.channel
+        if channel == NO_BEAT or not self._has_lease:
             return
-        if refused := self._refused.get(host):
-            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
+        if ahead is None or channel != ahead.channel:
+            self.follow()
+        elif command.heartbeat != ahead.heartbeat:
+            self._is_moving = True
+        self._ahead = command
+
+    def follow(self) -> None:
+        """Note what was left for later."""
+        if (ahead := self._ahead) is None:
+            return
+        if self._is_moving:
+            self.frames.count_move(ahead.peer)
+        self.frames.note(ahead.channel, ahead.heartbeat)
+        self._ahead, self._is_moving = None, False
+
+    def has_beaten(self, host: str) -> bool:
+        """Decide whether a host has written a heartbeat: a person writes none."""
+        return bool(self.frames.of(host))
+
+    def note_refused_beat(self, host: str, frame: StartFrame) -> None:
+        """Note the heartbeat of a write that was refused."""
+        if frame.heartbeat is None:
+            return
+        self._look_for(host, frame.heartbeat, frame.channel)
+        is_new = not self.frames.has_brought(frame.channel, frame.heartbeat)
+        self.frames.note(frame.channel, frame.heartbeat)
+        if is_new and (refused := self._refused.get(host)):
+            self._refused[host] = refused._replace(heartbeat=frame.heartbeat, beats=True)
 
     def repeats(self, host: str, frame: StartFrame, now_s: float) -> bool:
         """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
         was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
         is over."""
-        if host in self.lost and (frame.heartbeat is None or frame.heartbeat in self.lost[host]):
-            return True
-        if (refused := self._refused.get(host)) is None or not self._is_same(refused, frame):
+        if host in self.lost and (frame.heartbeat is None or not self._is_there(host, frame.heartbeat, frame.channel)):
+            if now_s - self._let_go_s.get(host, inf) < LONGEST_CYCLE_S:
+                return True
+            self._find(host)
+        if (refused := self._refused.get(host)) is None or not self._is_same(host, refused, frame):
             return False
-        if now_s - refused.at_s >= (_CYCLE_S if refused.is_let_go else _HELD_S):
+        if now_s - refused.at_s >= (LONGEST_CYCLE_S if refused.is_let_go else _HELD_S):
             del self._refused[host]
+            self._miss_no_more(host)
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
@@ -205,7 +225,9 @@ class HeldEnables:
 
     def knows(self, host: str) -> bool:
         """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
-        return host in self.by_host or host in self.lost or host in self._lost_now or host in self._refused
+        if host in self.by_host or host in self.lost or host in self._lost_now:
+            return True
+        return host in self._refused and not self.frames.has_moved_since(self._refused[host].moves, host)
 
     def holds(self, host: str, now_s: float) -> bool:
         """Decide whether a 1 of this host is one that it has kept up since the fault. If so, it goes on being kept up."""
@@ -217,27 +239,42 @@ class HeldEnables:
 
     def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
-        is_new = self._frames.note(channel, heartbeat)
-        if is_new and host in self._lost_now and heartbeat not in self._lost_now[host]:
-            self._find(host)
-        if (refused := self._refused.get(host)) is None:
-            return
-        if refused.heartbeat == heartbeat:
-            self._refused[host] = refused._replace(beats=True)
-        elif is_new:
-            del self._refused[host]
+        self._look_for(host, heartbeat, channel)
+        if not self.frames.note(channel, heartbeat) and (refused := self._refused.get(host)):
+            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
 
-    def let_go(self, host: str) -> None:
+    def _is_there(self, host: str, heartbeat: int, channel: Channel) -> bool:
+        """Whether the program of a lost master goes on: a heartbeat that only goes to and fro may have been in one of its
+        frames each way."""
+        if self.frames.knows(channel) and self.frames.has_changed(channel, heartbeat):
+            return True
+        lost = (*self.lost.get(host, ()), *self._lost_now.get(host, ()))
+        return heartbeat not in lost and not self.frames.has_brought(channel, heartbeat)
+
+    def _look_for(self, host: str, heartbeat: int, channel: Channel) -> None:
+        if (host in self.lost or host in self._lost_now) and self._is_there(host, heartbeat, channel):
+            if host in self.lost:  # beside what each of its frames had brought in the process before
+                self.frames.count_move(host)
+            self._find(host)
+
+    def let_go(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 0. What was refused, and comes again as soon as only a cycle does, is of a
-        program beside the one that wrote this."""
-        self._find(host)
+        program beside the one that wrote this: it is missed in the next process, too."""
+        if host in self.lost:
+            self._let_go_s[host] = now_s
         self._forget(host)
         if refused := self._refused.get(host):
             self._refused[host] = refused._replace(is_let_go=True)
+        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
+            self._miss_no_more(host)
 
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""
         self.lost.pop(host, None)
+        self._let_go_s.pop(host, None)
+        self._miss_no_more(host)
+
+    def _miss_no_more(self, host: str) -> None:
         if self._lost_now.pop(host, None) is not None:
             self.on_lost(dict(self._lost_now))
 

@@ -11,9 +11,7 @@ from collections.abc import Sequence
 from ipaddress import IPv4Address, IPv6Address, ip_address
 from typing import Final, TypeVar
 
-from gateway import defaults
 from gateway.modbus.peer import NOBODY, Peer
-from gateway.registers.command import Channel
 
 NOT_IPV4: Final = 0xFFFFFFFF
 """Shown in owner_ip for an owner without an IPv4 address (IPv6)."""
@@ -93,38 +91,6 @@ class Ownership:
         self.is_explicit = False
         self.former = self.owner or self.former
         self.owner = self._configured
-
-
-class FrameBeats:
-    """The last heartbeat of each frame: of a program that stands still none changes, whatever its other frames bring."""
-
-    def __init__(self) -> None:
-        self._last: dict[Channel, int] = {}
-
-    def has_brought(self, channel: Channel, heartbeat: int) -> bool:
-        """Decide whether this is what the frame has brought last: by another connection, where it is the first on this one."""
-        last = self._last.get(channel)
-        return (self._last_alike(channel) if last is None else last) == heartbeat
-
-    def _last_alike(self, channel: Channel) -> int | None:
-        """Return what a host's last frame to these words has brought: a program that hung may connect anew for each frame."""
-        host, _, _, *words = channel
-        alike = (beat for known, beat in reversed(self._last.items()) if known[0] == host and [*known[3:]] == words)
-        return next(alike, None)
-
-    def knows(self, channel: Channel) -> bool:
-        """Decide whether the frame has come before."""
-        return channel in self._last
-
-    def note(self, channel: Channel, heartbeat: int) -> bool:
-        """Note what a frame brings; return whether that is another heartbeat than before, or its first."""
-        is_new = not self.has_brought(channel, heartbeat)
-        keep_latest(self._last, channel, heartbeat)
-        return is_new
-
-    def of(self, host: str | None) -> list[int]:
-        """Return what the latest frames of a host have brought last."""
-        return [beat for channel, beat in self._last.items() if channel[0] == host][-defaults.MOST_FRAMES :]
 
 
 class LastWriters:

@@ -59,6 +59,7 @@ class RepeatedWrite:
         command = _new(Command, values)
         if self._admission.decide(_new(ProposedWrite, (command, tuple))):
             return None
+        self._admission.held_enables.follow_later(command)
         if heartbeat != current.heartbeat:
             self._commands.store_heartbeat(heartbeat)
         self._command = command

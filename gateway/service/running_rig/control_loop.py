@@ -104,7 +104,7 @@ class ControlLoop:
         )
         if lateness := process.lateness:
             self.warnings.held = lambda then_s, now_s: lateness.since(then_s, now_s, waited_s_of(self.processor_time()))
-        bank.held_enables.beats_of = controller.beats_of
+        bank.held_enables.beats_of, bank.held_enables.on_refused_beat = controller.beats_of, controller.hear_refused
         bank.on_command, bank.on_asked = self._on_command, self._on_asked
 
     def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:

@@ -154,7 +154,7 @@ DEFECTS = (
            "        self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)\n", "",
            ("end_to_end/kills/test_hung_master_behind_a_restart.py",)),
     Defect("behind a restart a hung program with two frames is known by one of them", "registers/writes/held_starts.py",
-           "(*self._frames.of(host), *self.beats_of(host), heartbeat)", "(heartbeat,)",
+           "(*self.frames.of(host), *self.beats_of(host), heartbeat)", "(heartbeat,)",
            ("service/running_rig/masters/test_behind_a_death.py",)),
     Defect("any master's leaving is the owner's", "service/running_rig/running_rig.py",
            "        if peer.identity == self.bank.owner:", "        if True:", ("service/running_rig/test_running_rig.py",)),

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers import BankRules, Command, RegisterBank
+from gateway.registers.command import NO_BEAT
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit, Mode
 from tests.calibrations.coefficients import calibration
@@ -27,7 +28,7 @@ def test_enable_and_setpoint_in_one_write_are_one_command(master, commands):
         number=1,
         received_s=7.0,
         peer="10.0.0.1",
-        channel=("10.0.0.1", "10.0.0.1", 40000, 0, 4),
+        channel=NO_BEAT,
     )
 
 

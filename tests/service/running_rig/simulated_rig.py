@@ -120,13 +120,21 @@ class Relay:
 
 class SmallRig:
     """Times are virtual seconds. beats: the owner's heartbeat changes every tenth of a second, where there is a lease.
-    is_restarted: the process before has ended without a word."""
+    is_restarted: the process before has ended without a word; needs_proof: of its byte order, of each master; began_s: when
+    this process is begun."""
 
     def __init__(
-        self, control: ControlSettings | None = None, *, seed: int = 1, is_restarted: bool = False, **plant: float
+        self,
+        control: ControlSettings | None = None,
+        *,
+        seed: int = 1,
+        is_restarted: bool = False,
+        needs_proof: bool = False,
+        began_s: float = 0.0,
+        **plant: float,
     ) -> None:
         self.settings = control or settings()
-        self.ticks = 0
+        self.ticks = round(began_s / TICK_S)
         self.is_cell_silent = False
         self.beats = self.settings.supervision.lease_s is not None
         self.beat = 0
@@ -138,6 +146,7 @@ class SmallRig:
             rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
             has_lease=self.settings.supervision.lease_s is not None,
+            require_byte_order_echo=needs_proof,
             supported_bits=BASIC_BITS
             | ControlBit.START_CALIBRATION
             | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0))

@@ -263,6 +263,6 @@ def test_a_host_that_holds_enable_over_a_fault_is_told_once_a_second_and_its_end
     held.on_change = told.append
     for tenth in range(25):
         held.note("10.0.0.5", 100.0 + 0.1 * tenth)
-    held.let_go("10.0.0.5")
-    held.let_go("10.0.0.5")
+    held.let_go("10.0.0.5", 103.0)
+    held.let_go("10.0.0.5", 103.0)
     assert [one.get("10.0.0.5") for one in told] == [100.0, pytest.approx(101.0), pytest.approx(102.0), None]
