@@ -243,7 +243,7 @@ class Admission:
             enables.let_go(write.host, now_s)
         if asked & TARE:
             self._note_tare(write.host, _channel(write), heartbeat, now_s)
-        elif zeros & TARE and self._last_tares.knows(write.host):
+        elif zeros & TARE and write.host in self._last_tares.by_host:
             self._last_tares.let_go(write.host)
 
     # -- why not

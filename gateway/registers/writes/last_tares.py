@@ -25,22 +25,22 @@ class LastTares:
 
     def __init__(self, frames: FrameBeats, *, has_lease: bool = True) -> None:
         self._has_lease, self._frames = has_lease, frames
-        self._last: dict[str, dict[Channel, _Tared]] = {}  # by host and frame, the latest last
+        self.by_host: dict[str, dict[Channel, _Tared]] = {}  # and frame, the latest last
 
     def note(self, host: str, channel: Channel, now_s: float) -> None:
         """Note a tare, behind the heartbeat that came with it."""
         if self._has_lease:
-            known = {**self._last.get(host, {})}
+            known = {**self.by_host.get(host, {})}
             known.pop(channel, None)
             known[channel] = _Tared(now_s, self._frames.moves_so_far)
-            keep_latest(self._last, host, dict(list(known.items())[-defaults.MOST_FRAMES :]))
+            keep_latest(self.by_host, host, dict(list(known.items())[-defaults.MOST_FRAMES :]))
 
     def repeats(self, host: str, frame: StartFrame, now_s: float) -> bool:
         """Decide whether no heartbeat of this host has moved since this frame of its has tared last; one that brings none comes
         as often as only a cycle does."""
-        if host not in self._last:
+        if host not in self.by_host:
             return False
-        tared = of_frame(self._last[host], frame.channel) or self._latest(host)
+        tared = of_frame(self.by_host[host], frame.channel) or self._latest(host)
         if self._frames.has_moved_since(tared.moves, host):
             return False
         is_soon = now_s - tared.tared_s < LONGEST_CYCLE_S
@@ -50,11 +50,11 @@ class LastTares:
 
     def knows(self, host: str) -> bool:
         """Decide whether this host has tared, and has not gone on since."""
-        return host in self._last and not self._frames.has_moved_since(self._latest(host).moves, host)
+        return host in self.by_host and not self._frames.has_moved_since(self._latest(host).moves, host)
 
     def let_go(self, host: str) -> None:
-        """Note that a host has written the bit as 0."""
-        self._last[host] = {channel: tared._replace(is_let_go=True) for channel, tared in self._last[host].items()}
+        """Note that a host of by_host has written the bit as 0."""
+        self.by_host[host] = {channel: tared._replace(is_let_go=True) for channel, tared in self.by_host[host].items()}
 
     def _latest(self, host: str) -> _Tared:
-        return next(reversed(self._last[host].values()))
+        return next(reversed(self.by_host[host].values()))
