@@ -96,8 +96,8 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         self._catch_up()
-        is_fault = self._image.word(self._bit_words.status.first) & StatusBit.FAULT
-        return build_server_id(self.identity, is_running=not is_fault)
+        status = self._image.word(self._bit_words.status.first)
+        return build_server_id(self.identity, is_running=not status & StatusBit.FAULT)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
@@ -117,12 +117,12 @@ class RegisterBank:
         if not 0 < count <= self._room[address]:
             raise self._note_refused_write(no_such_address(self._map.blocks, address, count), peer)
 
-    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Return bits of control_word (0-15) or status_word (100-115), packed."""
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY, *, is_write: bool = False) -> bytes:
+        """Return bits of control_word (0-15) or status_word (100-115), packed. is_write: of a request that would write."""
         try:
             first = self._bit_words.find(address, count).first
         except Refusal as refusal:
-            raise self._note_refusal(refusal, peer) from None
+            raise (self._note_refused_write if is_write else self._note_refusal)(refusal, peer) from None
         self._catch_up()
         bits = self._image.word(first) >> (address - first)
         return pack_bits([bool(bits >> k & 1) for k in range(count)])
