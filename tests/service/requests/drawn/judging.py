@@ -83,8 +83,8 @@ class Judge:
         for first, count in REFUSAL_WORDS:
             words[2 * first : 2 * (first + count)] = bytes(2 * count)
         decision = self._world.wired.loop.decision
-        parts = stage.upload, stage.recordings, stage.calibration_runs
-        told = str([part.status() for part in parts]).replace(str(stage.state), "")
+        run = stage.calibration_runs.status() | {"ended": ""}  # which tells what was refused last
+        told = str([stage.upload.status(), stage.recordings.status(), run]).replace(str(stage.state), "")
         return Look(bytes(words), bank.owner, bank.last_writer, decision.voltage_v if decision else 0.0, told)
 
     def judged(self, execute: Callable[..., Any]) -> Callable[..., Any]:
