@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import Peer
 from tests.service.requests.drawn.audit_count import AuditCount
+from tests.service.requests.drawn.parties import KEEPER
 from tests.service.requests.drawn.reference import OK, STAGING, UNITS, Before, Verdict, judge
 from tests.service.requests.drawn.world import World
 
@@ -66,6 +67,7 @@ class Judge:
     def __init__(self, first: "Judge | None" = None) -> None:
         self.broken, self.told, self.audit = list[str](), list[str](), AuditCount()
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
+        self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
     def follow(self, world: World) -> None:
         """From now on: whatever is executed and written there."""
@@ -130,8 +132,18 @@ class Judge:
         self.told.append(f"  {about}")
         return not verdict.is_write or bool(code and not verdict.is_remembered)
 
+    def would_stop(self, pdu: bytes, peer: Peer) -> bool:
+        """Decide whether a request would clear enable, by the rules."""
+        now = self.look()
+        facts = Before(now.command, now.owner, now.word(101))
+        known_bits = int(self._world.rig.supported_bits)
+        values = judge(pdu, int(peer.role), peer.identity, facts, known_bits).values or now.command
+        return bool(now.word(0) & 1) and not int(values[0]) & 1
+
     def _judge_accepted(self, peer: Peer, verdict: Verdict, looks: tuple[Look, Look], about: str) -> None:
         before, after = looks
+        if before.owner != after.owner or before.word(0) != after.word(0) or before.told != after.told:
+            self.is_disturbed |= peer.host != KEEPER
         if peer.role == 0:
             self.broken.append(f"a monitor writes: {about}")
         if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:

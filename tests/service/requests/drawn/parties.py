@@ -11,7 +11,9 @@ from gateway.modbus.rtu import encode_adu
 from tests.fuzz.frame_model import crc, frames_of
 from tests.service.requests.drawn.reference import is_whole
 from tests.service.requests.drawn.world import RTU_UNIT, World
+from tests.simulation.masters.spelling import write_one_pdu, write_pdu
 
+KEEPER = "10.0.0.8"
 SOON_S = 0.02
 BURST, PER_S = 45, 190.0
 """Requests that an address may ask at once, and in a second, without waiting for their turn; a little less than it may."""
@@ -100,11 +102,27 @@ class Client:
         return how
 
 
+class Keeper(Client):
+    """A master who holds a force through all that the others ask, and beats."""
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world, KEEPER)
+        self._beat = 0
+        self.send(self.frame(write_pdu(0, 1, 1200, 0, 0, 0)))
+        world.on_beat = self._send_beat
+        world.run(1.0)
+
+    def _send_beat(self) -> None:
+        self._beat = self._beat % 65000 + 1
+        self.send(self.frame(write_one_pdu(4, self._beat)))
+
+
 class Bus:
     """The master of the serial line, and whatever else is on it."""
 
     def __init__(self, world: World) -> None:
         self._world, self.name, self.broken = world, "bus", list[str]()
+        self.peer = world.bus.settings.peer
         self.ask(struct.pack(">BHH", 3, 100, 2))
 
     def ask(self, pdu: bytes, unit: int = RTU_UNIT, noise: bytes = b"") -> None:

@@ -11,24 +11,26 @@ import pytest
 from gateway.modbus import Peer, Role
 from gateway.profiles import Rig
 from gateway.registers.words import State
-from tests.service.requests.drawn.draws import STOPS, Upload, draw_request
+from tests.service.requests.drawn.draws import READ_STATUS, STOPS, Upload, draw_request
 from tests.service.requests.drawn.judging import Judge, differences
-from tests.service.requests.drawn.parties import Bus, Client
+from tests.service.requests.drawn.parties import KEEPER, Bus, Client, Keeper
 from tests.service.requests.drawn.reference import UNITS
 from tests.service.requests.drawn.tools import Tools
 from tests.service.requests.drawn.world import RTU_UNIT, World
 from tests.service.rigs import demo, with_supervision
 
 STEPS, PAUSES_S = 60, (0.0, 0.001, 0.01, 0.05, 0.2)
+PRESSING = State.RAMPING, State.HOLDING
 FOREIGN_UNITS = 2, 7, 247, 254
 
 
-def drawn_rig(draw: Random) -> Rig:
+def drawn_rig(draw: Random, *, is_kept: bool) -> Rig:
+    owners = (None, KEEPER, KEEPER) if is_kept else (*[None] * 5, "10.0.0.5", "certificate robot")
     rig = with_supervision(demo(), lease_s=draw.choice((None, None, 0.35)))
     network = replace(
         rig.network,
         allow_plain_upload=draw.random() < 0.5,
-        owner=draw.choice((*[None] * 5, "10.0.0.5", "certificate robot")),
+        owner=draw.choice(owners),
     )
     return replace(rig, network=network)
 
@@ -38,9 +40,12 @@ class Scene:
 
     def __init__(self, seed: int, state: Path, patch: pytest.MonkeyPatch, first: "Scene | None" = None) -> None:
         self.seed, self.draw, self.beat = seed, (draw := Random(seed)), 0
+        is_kept = draw.random() < 0.4
         self.judge = Judge(first.judge if first else None)
-        self.world = world = World(state, drawn_rig(draw), patch, self.judge.judged)
+        self.world = world = World(state, drawn_rig(draw, is_kept=is_kept), patch, self.judge.judged)
         self.judge.follow(world)
+        self.keeper = Keeper(world) if is_kept else None
+        self.keeps = bool(self.keeper) and world.wired.state in PRESSING
         self.clients = [Client(world, *one) for one in self._drawn_clients()]
         self.bus, self.tools = Bus(world), Tools(world, draw)
         self.uploads = {name: Upload(draw) for name in (*(one.name for one in self.clients), "bus", "socket")}
@@ -78,7 +83,7 @@ class Scene:
             (self._ask_and_not_read, 1),
             (self._leave, 2),
             (self._send_no_modbus, 1),
-            (self._stop, 5),
+            (self._stop, 0 if self.keeper else 5),
             (self._beats, 8),
             (self._use_tools, 14),
         )
@@ -87,7 +92,8 @@ class Scene:
         self.judge.told.append(f"  : {act()}")
 
     def _drawn(self, client: Client) -> bytes:
-        return draw_request(self.draw, self.beat, self.uploads[client.name])
+        pdu = draw_request(self.draw, self.beat, self.uploads[client.name])
+        return READ_STATUS if self.keeper and self.judge.would_stop(pdu, client.peer) else pdu
 
     def _ask(self) -> str:
         client = self.draw.choice(self.clients)
@@ -150,6 +156,8 @@ class Scene:
     def _ask_the_bus(self) -> str:
         draw = self.draw
         pdu = draw_request(draw, self.beat, self.uploads["bus"])[:253]
+        if self.keeper and self.judge.would_stop(pdu, self.bus.peer):
+            pdu = READ_STATUS
         noise = draw.randbytes(draw.randrange(1, 20)) if draw.random() < 0.2 else b""
         self.bus.ask(pdu, draw.choice((*[RTU_UNIT] * 7, 0, 9)), noise)
         return pdu.hex()
@@ -188,7 +196,9 @@ class Scene:
             self.judge.broken.append(f"{by} has stopped, and it is {state.name} with {word:#x} at {volts:.3f} V")
 
     def _use_tools(self) -> str:
-        return self.tools.act(self.judge.look, differences)
+        told = self.tools.act(self.judge.look, differences)
+        self.judge.is_disturbed |= self.tools.disturbs
+        return told
 
     def _look_around(self) -> None:
         for client in self.clients:
@@ -196,6 +206,13 @@ class Scene:
             client.judge_time()
         for one in (*self.clients, self.bus, self.tools):
             self.judge.broken += one.broken
+        if self.keeper:
+            self.keeper.judge_time()
+            self.judge.broken += self.keeper.broken
+            if self.keeps and not self.judge.is_disturbed and (state := self.world.wired.state) not in PRESSING:
+                self.judge.broken.append(
+                    f"the force of who keeps it is gone: {state.name}, {self.world.wired.log[-3:]}"
+                )
         self.judge.look_around()
 
     def _end(self) -> None:

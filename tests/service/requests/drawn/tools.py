@@ -38,11 +38,13 @@ Differences = Callable[[Any, Any], list[str]]
 class Tools:
     def __init__(self, world: World, draw: Random) -> None:
         self._world, self._draw, self.broken = world, draw, list[str]()
+        self.disturbs = False  # what was asked last: a run, or another model
         self._lines = mutants(CONTROL, 10**9, draw.getrandbits(32))
 
     def act(self, look: Look, differences: Differences) -> str:
         before = look()
         told, may_change = self._draw.choice((self._page, self._mqtt, self._socket))()
+        self.disturbs = may_change and any(word in told for word in ("calibrat", "plant"))
         if not may_change and (changes := differences(before, look())):
             self.broken.append(f"{told} changes {changes[:6]}")
         return told

@@ -40,7 +40,7 @@ from tests.web.commanded_gateway import Link
 
 TOKEN = "0123456789abcdef0123"
 RTU_UNIT, LINE = 3, SerialSettings(baud=115200)
-SWEEP_STEPS, MOST_TURNS = 500, 5000
+SWEEP_STEPS, BEAT_STEPS, MOST_TURNS = 500, 50, 5000
 Judge = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
@@ -76,6 +76,7 @@ class World:
         self.clock.now_s = self.wired.now_s
         self._soon: list[tuple[Callable[..., None], tuple[Any, ...]]] = []
         self.errors: list[Any] = []
+        self.on_beat: Callable[[], None] = lambda: None
         self.asked: dict[str, deque[float]] = {}
         """When each address has asked: its connections share one rate."""
         self.sleepers: list[tuple[float, asyncio.Future[None]]] = []
@@ -171,6 +172,8 @@ class World:
                 self.shared.peers.forget(self.clock.now_s)
             self.poll()
             self._wake()
+            if self._steps % BEAT_STEPS == 0:
+                self.on_beat()
 
     async def _sleep(self, seconds: float) -> None:
         waits = self.loop.create_future()
