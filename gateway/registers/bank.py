@@ -1,5 +1,4 @@
-"""The register bank: what a Modbus server asks for and writes to, and the one place where commands are accepted or
-refused.
+"""The register bank: what a Modbus server asks for and writes to, and the place where commands are accepted or refused.
 
 Checks run in this order: address (02), role (01, gateway.registers.roles), whole values (03), values (03), owner (06), then
 what the state allows. Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal
@@ -292,6 +291,7 @@ class RegisterBank:
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host, peer)
+        owners = owner, self._ownership.owner  # by this write; what control does in it is not its master's
         names = self._commands.names(write.block, write.address, len(write.data) // 2)
         if admitted.is_plain and address == self._command_block.first:
             self._repeated.note(data, peer, admitted.command, names)
@@ -300,10 +300,10 @@ class RegisterBank:
         is_guest = owner not in (None, write.host) and not admitted.is_taken_over  # nothing else of its write was taken
         self._writers.note(names[:1] if is_guest else names, peer, now_s)
         if self.on_write is not None:
-            self.on_write(peer, before, admitted, (owner, self._ownership.owner))
+            self.on_write(peer, before, admitted, owners)
         if self.on_accepted is not None:
             changes = self._commands.differences(before, admitted.values)
-            self._tell(accepted_sentence(changes, admitted, (owner, self._ownership.owner)), peer)
+            self._tell(accepted_sentence(changes, admitted, owners), peer)
 
     @property
     def last_writer(self) -> dict[str, tuple[Peer, float]]:

@@ -101,6 +101,15 @@ def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_fal
     assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
 
 
+def test_a_run_that_ends_within_a_heartbeat_is_no_change_of_owner_by_it(watched: Watched) -> None:
+    """Control decides at each write. Stopped by a person at the machine a moment ago, a run let its master go."""
+    watched.write(ROBOT, 0, 0, 1200)
+    watched.kept.clear()
+    watched.bank.on_command = lambda command: watched.bank.clear_command()
+    watched.write(ROBOT, 4, 7)
+    assert watched.bank.owner is None and watched.kept == []
+
+
 def test_a_bit_that_falls_is_named_by_what_its_fall_does() -> None:
     """Who reads that a calibration was started twice looks for a second one."""
     watched = Watched(supported_bits=ControlBit(127))

@@ -15,6 +15,7 @@ BITS = {1: "enable", 2: "reset_fault", 4: "tare", 8: "take_ownership", 16: "valv
         64: "start_self_test"}  # fmt: skip
 FALLS, RUNS = {1: "disable"}, (32, 64)
 MOMENTARY = 2 | 4 | 8
+CHANGING = "record", "calibration", "plant", "calibrate", "sim"
 NOT_COUNTED = "stop", "stop_calibration", "commit", "slot_select"
 """Ends of runs, which have more than one, and acts of an upload: others look at these."""
 
@@ -23,6 +24,11 @@ class AuditCount:
     def __init__(self) -> None:
         self.lines: list[dict[str, Any]] = []
         self._wanted: Counter[tuple[str, str]] = Counter()
+
+    def note_local(self, request: dict[str, Any]) -> None:
+        """What the control socket has been asked to change, and has taken."""
+        if request["do"] in CHANGING and len(request) > 1 and not request.get("dry_run"):
+            self._wanted["control socket", request["do"]] += 1
 
     def note_refused(self, peer: Peer) -> None:
         self._wanted[_name(str(peer)), "refused"] += 1
@@ -45,7 +51,10 @@ class AuditCount:
         told: Counter[tuple[str, str]] = Counter()
         for line in self.lines:
             ends_run = line["what"] == "start_self_test" and line.get("old") == 1.0
-            if ends_run or line["peer"] in ("gateway", "control socket") or line["what"] in NOT_COUNTED:
+            is_local = line["peer"] == "control socket"
+            if ends_run or line["peer"] == "gateway" or line["what"] in NOT_COUNTED:
+                continue
+            if is_local and line["result"] != "accepted":
                 continue
             what = line["what"] if line["result"] == "accepted" else "refused"
             told[_name(line["peer"]), what] += line.get("count", 1)

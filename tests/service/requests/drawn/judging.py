@@ -1,5 +1,6 @@
 """Each request of a scene, judged where it is executed, whichever way it came by; and what two plays of it must share."""
 
+import json
 from collections.abc import Callable
 from struct import unpack
 from typing import Any, NamedTuple
@@ -8,7 +9,7 @@ from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import Peer
 from tests.service.requests.drawn.audit_count import AuditCount
 from tests.service.requests.drawn.parties import KEEPER
-from tests.service.requests.drawn.reference import OK, STAGING, UNITS, Before, Verdict, judge
+from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge
 from tests.service.requests.drawn.world import World
 
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
@@ -76,7 +77,14 @@ class Judge:
         writes._put, writes._clock = self.audit.lines.append, world.clock.time  # type: ignore[assignment]
         self._bank.on_write, self._bank.on_refused_write = writes.note_command, writes.note_refusal
         self._bank.staging.on_act = writes.note_act
-        self._writes = writes
+        self._writes, ask = writes, world.stage.ask
+
+        def asked(line: bytes) -> dict[str, Any]:
+            if (answer := ask(line))["ok"]:
+                self.audit.note_local(json.loads(line))
+            return answer
+
+        world.stage.ask = asked  # type: ignore[method-assign]
 
     def look(self) -> Look:
         bank, stage = self._bank, self._world.stage
@@ -148,6 +156,8 @@ class Judge:
             self.broken.append(f"a monitor writes: {about}")
         if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
             self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
+        if before.word(101) == CALIBRATING != after.word(101) and verdict.written is None:
+            return  # a run has ended meanwhile, and took its setpoints and owner along
         self.audit.note_accepted(peer, (before.command, after.command), verdict.written, (before.owner, after.owner))
 
     def _judge_places(self, pdu: bytes, looks: tuple[Look, Look], about: str) -> None:

@@ -110,7 +110,7 @@ class Keeper(Client):
         self._beat = 0
         self.send(self.frame(write_pdu(0, 1, 1200, 0, 0, 0)))
         world.on_beat = self._send_beat
-        world.run(1.0)
+        world.run(0.5)
 
     def _send_beat(self) -> None:
         self._beat = self._beat % 65000 + 1

@@ -19,7 +19,7 @@ from tests.service.requests.drawn.tools import Tools
 from tests.service.requests.drawn.world import RTU_UNIT, World
 from tests.service.rigs import demo, with_supervision
 
-STEPS, PAUSES_S = 60, (0.0, 0.001, 0.01, 0.05, 0.2)
+STEPS, PAUSES_S = 60, (0.0, 0.001, 0.01, 0.02, 0.1)
 PRESSING = State.RAMPING, State.HOLDING
 FOREIGN_UNITS = 2, 7, 247, 254
 
@@ -166,7 +166,7 @@ class Scene:
         """Whoever owns lives a while."""
         for client in self.clients:
             if client.peer.identity == self.world.bank.owner:
-                for _ in range(self.draw.randrange(3, 12)):
+                for _ in range(self.draw.randrange(2, 7)):
                     self.beat = self.beat % 65000 + 1
                     client.send(client.frame(b"\6\0\4" + self.beat.to_bytes(2, "big")))
                     self.world.run(0.1)
@@ -216,8 +216,11 @@ class Scene:
         self.judge.look_around()
 
     def _end(self) -> None:
-        self.world.run(3.0)
-        self._look_around()
+        for _ in range(15):  # whoever has asked more than its address may waits for its turn
+            self.world.run(0.2)
+            self._look_around()
+            if not any(one.owed for one in self.clients):
+                break
         self.judge.end()
         owed = [one for one in self.clients if one.owed and not one.is_closed]
         self.judge.broken += [f"{one.name} is owed {len(one.owed)} answers" for one in owed]
