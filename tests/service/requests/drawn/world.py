@@ -76,6 +76,7 @@ class World:
         self.clock.now_s = self.wired.now_s
         self._soon: list[tuple[Callable[..., None], tuple[Any, ...]]] = []
         self.errors: list[Any] = []
+        self._far: list[socket.socket] = []
         self.on_beat: Callable[[], None] = lambda: None
         self.asked: dict[str, deque[float]] = {}
         """When each address has asked: its connections share one rate."""
@@ -202,6 +203,7 @@ class World:
         wire.address = host, port
         wire.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
         far.setblocking(False)
+        self._far.append(far)
         protocol = Connection(self.shared)
         if certified:
             CertifiedTransport(self.ready, wire, protocol, certified)
@@ -245,6 +247,8 @@ class World:
         for one in tuple(self.shared.connections):
             one.abort()
         self.poll()
+        for far in self._far:
+            far.close()
         self.ready.close()
         self.do(_cancel_others())
         self.loop.close()
