@@ -14,6 +14,7 @@ from tests.service.requests.drawn.world import World
 
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 """What may be another behind a refusal: where, what and why, in three faces."""
+MOST_WORDS, COILS = 125, (5, 15)
 ACTS = 1145, 1149
 """Commit, and choice of a slot: what is written there acts, and may change other registers."""
 LARGEST_HELD = 65536 + 1024 + 260
@@ -128,8 +129,8 @@ class Judge:
             self.broken.append(f"not one of {sorted(verdict.codes)}: {about} {reason}")
         if (code or not verdict.is_write) and (changes := differences(before, after)):
             self.broken.append(f"changes {changes[:6]}: {about}")
-        if code and not self._world.wired.word("refusal_reason"):
-            self.broken.append(f"no reason: {about}")
+        if code:
+            self._judge_reason(pdu, about)
         if code and verdict.is_write:
             self.audit.note_refused(peer)
         elif verdict.is_write:
@@ -148,15 +149,26 @@ class Judge:
         values = judge(pdu, int(peer.role), peer.identity, facts, known_bits).values or now.command
         return bool(now.word(0) & 1) and not int(values[0]) & 1
 
+    def _judge_reason(self, pdu: bytes, about: str) -> None:
+        """The registers say why, and where: at a word of this request, or of the register that it cuts."""
+        place, reason = (self._world.wired.word(name) for name in ("refusal_address", "refusal_reason"))
+        firsts = [unpack(">H", pdu[at : at + 2])[0] for at in (1, 5) if len(pdu) >= at + 2]
+        firsts += [0] if pdu[0] in COILS else []  # bits of the control word
+        if not reason or not (place == 0xFFFF or any(first - 1 <= place <= first + MOST_WORDS for first in firsts)):
+            self.broken.append(f"the registers tell reason {reason} at {place}: {about}")
+
     def _judge_accepted(self, peer: Peer, verdict: Verdict, looks: tuple[Look, Look], about: str) -> None:
         before, after = looks
+        written = [name for name, by in after.writers.items() if by != before.writers.get(name)]
+        if any(after.writers[name][0].identity != peer.identity for name in written):
+            self.broken.append(f"{written} are told to be another's: {about}")
         if before.owner != after.owner or before.word(0) != after.word(0) or before.told != after.told:
             self.is_disturbed |= peer.host != KEEPER
         if peer.role == 0:
             self.broken.append(f"a monitor writes: {about}")
         if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
             self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
-        if before.word(101) == CALIBRATING != after.word(101) and verdict.written is None:
+        if before.word(101) == CALIBRATING != after.word(101) and verdict.written != 0:
             return  # a run has ended meanwhile, and took its setpoints and owner along
         self.audit.note_accepted(peer, (before.command, after.command), verdict.written, (before.owner, after.owner))
 
@@ -193,6 +205,7 @@ class Judge:
         if b"".join(cdab[k + 2 : k + 4] + cdab[k : k + 2] for k in range(0, 192, 4)) != abcd:
             self.broken.append("ABCD and CDAB tell different numbers")
         self._judge_live(now)
+        self._judge_owner(now)
         self.judge_bounds()
         self.broken += [sentence for sentence in self._world.stage.said if "A499" in sentence]
         self.broken += [str(error) for error in self._world.errors]
@@ -209,6 +222,15 @@ class Judge:
         if max(abs(a - b) for a, b in zip(told, stand, strict=True)) > 1 or live["owner"] != now.owner:
             about = f"{live['force']} of {live['owner']}, the registers {stand} of {now.owner}"
             self.broken.append(f"the state in words tells {about}")
+
+    def _judge_owner(self, now: Look) -> None:
+        """Words 116 and 117 tell the address of who owns: 0 of nobody."""
+        owner, shown = now.owner or "0.0.0.0", now.word(116) << 16 | now.word(117)
+        told = {"serial:1": 1}.get(owner)
+        if owner[0].isdecimal():
+            told = int.from_bytes(bytes(map(int, owner.split("."))), "big")
+        if told is not None and shown != told:
+            self.broken.append(f"owner_ip is {shown:x}, and {owner} owns")
 
     def judge_bounds(self) -> None:
         for one in self._world.shared.connections:
