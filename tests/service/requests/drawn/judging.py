@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from gateway.audit.write_audit import WriteAudit
 from gateway.modbus import Peer
+from tests.fuzz.bank_model import ENABLE
 from tests.service.requests.drawn.audit_count import AuditCount
 from tests.service.requests.drawn.parties import KEEPER
 from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge
@@ -168,7 +169,8 @@ class Judge:
             self.broken.append(f"a monitor writes: {about}")
         if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
             self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
-        if before.word(101) == CALIBRATING != after.word(101) and verdict.written != 0:
+        is_no_stop = verdict.written is None or verdict.written & ENABLE
+        if before.word(101) == CALIBRATING != after.word(101) and is_no_stop:
             return  # a run has ended meanwhile, and took its setpoints and owner along
         self.audit.note_accepted(peer, (before.command, after.command), verdict.written, (before.owner, after.owner))
 
