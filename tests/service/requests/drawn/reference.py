@@ -29,7 +29,6 @@ class Before:
     values: list[float]
     owner: str | None
     state: int
-    has_lease: bool = False
 
 
 @dataclass

@@ -24,6 +24,7 @@ from gateway.fieldbus.rate_limits import LogLimiter
 from gateway.fieldbus.socket_transport import ReadySockets, SocketTransport
 from gateway.modbus import Peer
 from gateway.profiles import Rig
+from gateway.service import live_answers
 from gateway.service.running_rig.bank_rules import plain_role
 from gateway.telemetry.mqtt.register_commands import RegisterCommands
 from gateway.web import server as page_server
@@ -98,7 +99,6 @@ class World:
 
     def _serve_uploads(self) -> None:
         upload = self.stage.upload
-        upload.run_in_background = upload.on_use = None  # type: ignore[assignment]
         upload.run_in_background, upload.on_use = AtOnce(), self._use
         self.stage.plants.run_in_background = AtOnce()
 
@@ -116,13 +116,10 @@ class World:
         for module, names in (
             (connection, ("whole_answer", "answer", "refuse_unit")),
             (rtu_server, ("answer", "refuse_echo")),
+            (live_answers, ("answer", "refuse_unit")),
         ):
             for name in names:
                 patch.setattr(module, name, judged(getattr(module, name)))
-        from gateway.service import live_answers
-
-        for name in ("answer", "refuse_unit"):
-            patch.setattr(live_answers, name, judged(getattr(live_answers, name)))
 
         async def ask_once(_state: Path, request: dict[str, Any]) -> dict[str, Any]:
             return await Link(self.stage).ask(request)
