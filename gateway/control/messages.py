@@ -136,5 +136,5 @@ def master_lost_sentence(line: LineStatus, lease_age_s: float, *, is_behind: boo
         return "master lost: its heartbeats wait behind its other requests, and it may be gone: let it wait for each answer"
     why = "" if line.owner_connected else "connection closed, "
     if line.owner_connected and line.owner_refused:
-        why = f"its last write was refused, and a heartbeat in it too ({line.owner_refused}); "
+        why = f"its last write was refused, with any heartbeat in it ({line.owner_refused}); "
     return f"master lost: {why}heartbeat unchanged for {lease_age_s * 1e3:.0f} ms"

@@ -38,8 +38,9 @@ class DataBank(Protocol):
     def read_registers(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
         """Return the registers as big-endian words. count is 1..125 already."""
 
-    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Return bits, packed, first bit lowest, unused bits 0. count is 1..2000 already."""
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY, *, is_write: bool = False) -> bytes:
+        """Return bits, packed, first bit lowest, unused bits 0. count is 1..2000 already. is_write: of a request that would
+        write them."""
 
     def check_registers_readable(self, address: int, count: int, peer: Peer = NOBODY) -> None:
         """Raise what read_registers would raise."""
@@ -107,7 +108,7 @@ def _read_registers(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
 def _write_coil(pdu: bytes, bank: DataBank, peer: Peer) -> bytes:
     address, word = P.parse_write_one(pdu)
     if word not in (0x0000, 0xFF00):
-        bank.read_bits(address, 1, peer)
+        bank.read_bits(address, 1, peer, is_write=True)
         raise RequestError(RequestFault.VALUE, f"coil value 0x{word:04X}, allowed 0x0000 and 0xFF00", word, address)
     bank.write_bits(address, (word == 0xFF00,), peer)
     return pdu

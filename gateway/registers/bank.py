@@ -1,5 +1,4 @@
-"""The register bank: what a Modbus server asks for and writes to, and the one place where commands are accepted or
-refused.
+"""The register bank: what a Modbus server asks for and writes to, and the place where commands are accepted or refused.
 
 Checks run in this order: address (02), role (01, gateway.registers.roles), whole values (03), values (03), owner (06), then
 what the state allows. Everything is checked before anything is stored; a refusal leaves no trace but the last-refusal
@@ -97,8 +96,8 @@ class RegisterBank:
     def server_id(self) -> ServerId:
         """The identity for FC17. It runs unless a fault is latched: whether a force is held is in status_word."""
         self._catch_up()
-        is_fault = self._image.word(self._bit_words.status.first) & StatusBit.FAULT
-        return build_server_id(self.identity, is_running=not is_fault)
+        status = self._image.word(self._bit_words.status.first)
+        return build_server_id(self.identity, is_running=not status & StatusBit.FAULT)
 
     def note_refusal(self, refusal: RequestError, peer: Peer) -> None:
         """Note the reason of what the framing has refused, as all others do."""
@@ -118,12 +117,12 @@ class RegisterBank:
         if not 0 < count <= self._room[address]:
             raise self._note_refused_write(no_such_address(self._map.blocks, address, count), peer)
 
-    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
-        """Return bits of control_word (0-15) or status_word (100-115), packed."""
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY, *, is_write: bool = False) -> bytes:
+        """Return bits of control_word (0-15) or status_word (100-115), packed. is_write: of a request that would write."""
         try:
             first = self._bit_words.find(address, count).first
         except Refusal as refusal:
-            raise self._note_refusal(refusal, peer) from None
+            raise (self._note_refused_write if is_write else self._note_refusal)(refusal, peer) from None
         self._catch_up()
         bits = self._image.word(first) >> (address - first)
         return pack_bits([bool(bits >> k & 1) for k in range(count)])
@@ -292,6 +291,7 @@ class RegisterBank:
         self._commands.store(admitted.values, admitted.kept)
         self._admission.note_stored(admitted)
         self._settle_owner(admitted, write.host, peer)
+        owners = owner, self._ownership.owner  # by this write; what control does in it is not its master's
         names = self._commands.names(write.block, write.address, len(write.data) // 2)
         if admitted.is_plain and address == self._command_block.first:
             self._repeated.note(data, peer, admitted.command, names)
@@ -300,10 +300,10 @@ class RegisterBank:
         is_guest = owner not in (None, write.host) and not admitted.is_taken_over  # nothing else of its write was taken
         self._writers.note(names[:1] if is_guest else names, peer, now_s)
         if self.on_write is not None:
-            self.on_write(peer, before, admitted, (owner, self._ownership.owner))
+            self.on_write(peer, before, admitted, owners)
         if self.on_accepted is not None:
             changes = self._commands.differences(before, admitted.values)
-            self._tell(accepted_sentence(changes, admitted, (owner, self._ownership.owner)), peer)
+            self._tell(accepted_sentence(changes, admitted, owners), peer)
 
     @property
     def last_writer(self) -> dict[str, tuple[Peer, float]]:

@@ -67,11 +67,18 @@ def test_who_what_old_new_and_result_are_kept(watched: Watched) -> None:
     ("pdu", "where", "code", "new"),
     [
         (b"\x05\x00\x00\x12\x34", 0, "W204", 0x1234),
+        (b"\x05\x00\x63\x12\x34", 99, "W202", None),
         (b"\x10\x00\x01\x00\x02\x03\x00\x00\x00", 1, "W220", None),
         (b"\x06\x00\x01", 1, "W220", None),
         (b"\x17\x03\xe7\x00\x02\x00\x01\x00\x01\x02\x04\xb0", 999, "W202", None),
     ],
-    ids=["FC05 with neither 0 nor 1", "FC16 with another count", "FC06 cut off", "FC23 that reads nowhere"],
+    ids=[
+        "FC05 with neither 0 nor 1",
+        "FC05 nowhere with neither",
+        "FC16 with another count",
+        "FC06 cut off",
+        "FC23 that reads nowhere",
+    ],
 )
 def test_a_write_that_the_protocol_s_own_rules_refuse_is_kept_too(
     watched: Watched, pdu: bytes, where: int, code: str, new: float | None
@@ -92,6 +99,15 @@ def test_a_stop_of_a_run_that_this_machine_has_begun_is_kept_although_no_bit_fal
     watched.bank.publish(Status(state=State.CALIBRATING))
     watched.write(OTHER, 0, 0)
     assert watched.told("peer", "what", "result") == [("10.0.0.6:4712", "stop", "accepted")]
+
+
+def test_a_run_that_ends_within_a_heartbeat_is_no_change_of_owner_by_it(watched: Watched) -> None:
+    """Control decides at each write. Stopped by a person at the machine a moment ago, a run let its master go."""
+    watched.write(ROBOT, 0, 0, 1200)
+    watched.kept.clear()
+    watched.bank.on_command = lambda command: watched.bank.clear_command()
+    watched.write(ROBOT, 4, 7)
+    assert watched.bank.owner is None and watched.kept == []
 
 
 def test_a_bit_that_falls_is_named_by_what_its_fall_does() -> None:

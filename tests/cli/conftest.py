@@ -77,7 +77,7 @@ class PlainBank:
         self.writes.append((address, words))
         self.words |= {address + at: word for at, word in enumerate(words)}
 
-    def read_bits(self, address: int, count: int, peer: Peer = NOBODY) -> bytes:
+    def read_bits(self, address: int, count: int, peer: Peer = NOBODY, *, is_write: bool = False) -> bytes:
         raise ModbusError(1, "not here")
 
     def write_bits(self, address: int, values: Sequence[bool], peer: Peer) -> None:

@@ -48,11 +48,12 @@ def float_of(words: Words, order: str) -> float:
 
 @dataclass
 class BankModel:
-    """values: of the 16 words of the command block, in the registers' units."""
+    """values: of the 16 words of the command block, in the registers' units. known_bits: of the control word."""
 
     values: list[float] = field(default_factory=lambda: [0.0] * 16)
     owner: str | None = None
     is_explicit: bool = False
+    known_bits: int = KNOWN
 
     # -- reading
 
@@ -114,7 +115,7 @@ class BankModel:
                 changed[k] = self._from_word(k, word)
         else:
             self._read_floats(changed, base, offset, words)
-        if int(changed[0]) & ~KNOWN or changed[3] not in (0, 1):
+        if int(changed[0]) & ~self.known_bits or changed[3] not in (0, 1):
             raise Refused(3)
         return changed
 
@@ -192,9 +193,9 @@ class BankModel:
         function = pdu[0]
         if function in (8, 17, 43):
             return None
-        if function not in _SHAPES:
+        if function not in SHAPES:
             return 1
-        if not _SHAPES[function](pdu):
+        if not SHAPES[function](pdu):
             return 3
         numbers = struct.unpack(f">{(len(pdu) - 1) // 2}H", pdu[1 : 1 + (len(pdu) - 1) // 2 * 2])
         return _ACTS[function](self, pdu, numbers, host)
@@ -269,7 +270,7 @@ def _read_write_shape(pdu: bytes) -> bool:
 
 
 Shape = type(_read_write_shape)
-_SHAPES = {
+SHAPES = {
     1: _counts(2000, 5), 2: _counts(2000, 5), 3: _counts(125, 5), 4: _counts(125, 5), 5: lambda pdu: len(pdu) == 5,
     6: lambda pdu: len(pdu) == 5, 15: _carries(1968, 3, 1 / 8), 16: _carries(123, 3, 2), 22: lambda pdu: len(pdu) == 7,
     23: _read_write_shape,

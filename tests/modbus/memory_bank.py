@@ -39,7 +39,7 @@ class MemoryBank:
         changed = (word & and_mask) | (or_mask & ~and_mask & 0xFFFF)
         self.write_registers(address, changed.to_bytes(2, "big"), peer)
 
-    def read_bits(self, address: int, count: int, _peer: Peer = NOBODY) -> bytes:
+    def read_bits(self, address: int, count: int, _peer: Peer = NOBODY, *, is_write: bool = False) -> bytes:
         self._check_bits(address, count)
         return pack_bits(self.bits[address : address + count])
 

@@ -83,4 +83,10 @@ DEFECTS = (
            ("web/tabs/test_rig_tabs.py",)),
     Defect("the page names :: as a host", "web/register_table.py",
            "network.bind in (\"0.0.0.0\", \"::\")", "network.bind == \"0.0.0.0\"", ("web/tabs/test_rig_tabs.py",)),
+    Defect("what a master has asked is shown as what control makes of it", "service/live_answers.py",
+           "requested_n=decision.force_requested_n,", "requested_n=decision.force_accepted_n,",
+           ("service/requests/drawn/test_drawn_requests.py",)),
+    Defect("a ramp's end is shown for where it is", "service/live_answers.py",
+           "applied_n=decision.force_applied_n,", "applied_n=decision.force_accepted_n,",
+           ("service/requests/drawn/test_drawn_requests.py",)),
 )  # fmt: skip

@@ -28,7 +28,7 @@ def test_a_heartbeat_in_a_refused_block_is_none_and_the_fault_tells_where_to_loo
         wired.run(BEAT_S)
     assert wired.fault_code is FaultCode.MASTER_LOST
     (told,) = (sentence for _, sentence in wired.log if sentence.startswith("A310 "))
-    assert "its last write was refused, and a heartbeat in it too (W204 force_setpoint = 90.00 N, allowed 0 .. " in told
+    assert "its last write was refused, with any heartbeat in it (W204 force_setpoint = 90.00 N, allowed 0 .. " in told
     explanation = wired.fault_code.explanation
     assert "refused" in explanation.probably and "refusal_reason" in explanation.do
 

@@ -1,0 +1,230 @@
+"""Parties on all faces of one gateway ask what a seed draws; each request is judged where it is executed."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from gateway.modbus import Peer, Role
+from gateway.profiles import Rig
+from gateway.registers.words import State
+from tests.service.requests.drawn.draws import READ_STATUS, STOPS, Upload, draw_request
+from tests.service.requests.drawn.judging import Judge, differences
+from tests.service.requests.drawn.parties import KEEPER, Bus, Client, Keeper
+from tests.service.requests.drawn.reference import UNITS
+from tests.service.requests.drawn.tools import Tools
+from tests.service.requests.drawn.world import RTU_UNIT, World
+from tests.service.rigs import demo, with_supervision
+
+STEPS, PAUSES_S = 60, (0.0, 0.001, 0.01, 0.02, 0.1)
+PRESSING = State.RAMPING, State.HOLDING
+FOREIGN_UNITS = 2, 7, 247, 254
+
+
+def drawn_rig(draw: Random, *, is_kept: bool) -> Rig:
+    owners = (None, KEEPER, KEEPER) if is_kept else (*[None] * 5, "10.0.0.5", "certificate robot")
+    rig = with_supervision(demo(), lease_s=draw.choice((None, None, 0.35)))
+    network = replace(
+        rig.network,
+        allow_plain_upload=draw.random() < 0.5,
+        owner=draw.choice(owners),
+    )
+    return replace(rig, network=network)
+
+
+class Scene:
+    """first: the same scene, played before."""
+
+    def __init__(self, seed: int, state: Path, patch: pytest.MonkeyPatch, first: "Scene | None" = None) -> None:
+        self.seed, self.draw, self.beat = seed, (draw := Random(seed)), 0
+        is_kept = draw.random() < 0.4
+        self.judge = Judge(first.judge if first else None)
+        self.world = world = World(state, drawn_rig(draw, is_kept=is_kept), patch, self.judge.judged)
+        self.judge.follow(world)
+        self.keeper = Keeper(world) if is_kept else None
+        self.keeps = bool(self.keeper) and world.wired.state in PRESSING
+        self.clients = [Client(world, *one) for one in self._drawn_clients()]
+        self.bus, self.tools = Bus(world), Tools(world, draw)
+        self.uploads = {name: Upload(draw) for name in (*(one.name for one in self.clients), "bus", "socket")}
+
+    def _drawn_clients(self) -> list[tuple[str, Peer | None]]:
+        roles = {"panel": Role.MONITOR, "robot": Role.SETPOINT, "plc": Role.CALIBRATION, "chief": Role.ADMIN}
+        plain: list[tuple[str, Peer | None]] = [(host, None) for host in ("10.0.0.5", "10.0.0.6", "127.0.0.1")]
+        tls = [("10.0.0.9", Peer("10.0.0.9", 5000, name=name, role=role)) for name, role in roles.items()]
+        return self.draw.sample(plain, 2) + [*self.draw.sample(tls, 2), tls[0]][:2]  # type: ignore[return-value, arg-type]
+
+    def play(self) -> list[str]:
+        try:
+            for _ in range(STEPS):
+                self._act()
+                self.world.run(self.draw.choice(PAUSES_S))
+                self._look_around()
+                if self.judge.broken:
+                    break
+            else:
+                self._end()
+        finally:
+            self.world.close()
+        return self.judge.broken
+
+    # -- what happens
+
+    def _act(self) -> None:
+        draw = self.draw
+        self.beat = self.beat % 65000 + 1
+        acts: tuple[tuple[Callable[[], str], int], ...] = (
+            (self._ask, 40),
+            (self._ask_the_bus, 6),
+            (self._ask_in_pieces, 3),
+            (self._ask_many, 3),
+            (self._ask_and_not_read, 1),
+            (self._leave, 2),
+            (self._send_no_modbus, 1),
+            (self._stop, 0 if self.keeper else 5),
+            (self._beats, 8),
+            (self._use_tools, 14),
+        )
+        (act,) = draw.choices([one for one, _ in acts], [weight for _, weight in acts])
+        self.judge.told.append(f"{self.world.clock.now_s:.3f} {act.__name__}")
+        self.judge.told.append(f"  : {act()}")
+
+    def _drawn(self, client: Client) -> bytes:
+        pdu = draw_request(self.draw, self.beat, self.uploads[client.name])
+        return READ_STATUS if self.keeper and self.judge.would_stop(pdu, client.peer) else pdu
+
+    def _ask(self) -> str:
+        client = self.draw.choice(self.clients)
+        client.send(client.frame(self._drawn(client), self._unit()))
+        return client.name
+
+    def _unit(self) -> int:
+        return self.draw.choice(FOREIGN_UNITS if self.draw.random() < 0.04 else UNITS)
+
+    def _ask_in_pieces(self) -> str:
+        client = self.draw.choice(self.clients)
+        data = b"".join(client.frame(self._drawn(client)) for _ in range(self.draw.randrange(1, 4)))
+        while data:
+            at = self.draw.randrange(1, len(data) + 1)
+            client.send(data[:at])
+            data = data[at:]
+            self.world.run(self.draw.choice((0.0, 0.001, 0.01)))
+            client.owed = type(client.owed)((self.world.clock.now_s, *rest) for _, *rest in client.owed)
+        client.collect()
+        return client.name
+
+    def _ask_many(self) -> str:
+        """More at once than are answered in one turn."""
+        client, count = self.draw.choice(self.clients), self.draw.choice((5, 20, 44))
+        client.send(b"".join(client.frame(self._drawn(client)) for _ in range(count)))
+        return f"{client.name} {count}"
+
+    def _ask_and_not_read(self) -> str:
+        client = self.draw.choice(self.clients)
+        client.reads = False
+        for _ in range(40):
+            client.send(b"".join(client.frame(bytes.fromhex("030064001f")) for _ in range(8)))
+            self.world.run(0.005)
+            other = self.draw.choice([one for one in self.clients if one is not client])
+            other.send(other.frame(bytes.fromhex("0300640010")))
+            self.judge.judge_bounds()
+        client.reads = True
+        client.wire.close()
+        client.connect()
+        return client.name
+
+    def _leave(self) -> str:
+        client = self.draw.choice(self.clients)
+        return f"{client.name} {client.leave(self.draw)}"
+
+    def _send_no_modbus(self) -> str:
+        client = self.draw.choice(self.clients)
+        client.collect()
+        client.send(
+            self.draw.choice((b"\0\1\0\1\0\6", b"\0\1\0\0\0\1", b"\0\1\0\0\xff\xff", b"GET / HTTP/1.1\r\n")) + bytes(8)
+        )
+        self.world.run(0.3)
+        client.collect()
+        if not client.is_closed:
+            self.judge.broken.append(f"{client.name} sends no Modbus and is still connected")
+        client.wire.close()
+        client.connect()
+        return client.name
+
+    def _ask_the_bus(self) -> str:
+        draw = self.draw
+        pdu = draw_request(draw, self.beat, self.uploads["bus"])[:253]
+        if self.keeper and self.judge.would_stop(pdu, self.bus.peer):
+            pdu = READ_STATUS
+        noise = draw.randbytes(draw.randrange(1, 20)) if draw.random() < 0.2 else b""
+        self.bus.ask(pdu, draw.choice((*[RTU_UNIT] * 7, 0, 9)), noise)
+        return pdu.hex()
+
+    def _beats(self) -> str:
+        """Whoever owns lives a while."""
+        for client in self.clients:
+            if client.peer.identity == self.world.bank.owner:
+                for _ in range(self.draw.randrange(2, 7)):
+                    self.beat = self.beat % 65000 + 1
+                    client.send(client.frame(b"\6\0\4" + self.beat.to_bytes(2, "big")))
+                    self.world.run(0.1)
+                return client.name
+        self.world.run(0.2)
+        return "nobody"
+
+    def _stop(self) -> str:
+        """Whoever owns, and whatever goes on: who may command at all may end it, now."""
+        draw = self.draw
+        clients = [one for one in self.clients if (one.certified.role if one.certified else 1) > 0 and not one.owed]
+        pdu, by = draw.choice(STOPS), draw.choice((*clients, "bus", "web", "mqtt"))
+        if isinstance(by, Client):
+            by.send(by.frame(pdu))
+        elif by == "bus":
+            self.bus.ask(pdu, draw.choice((RTU_UNIT, 0)))
+        else:
+            self.tools.stop(by)
+        if by == "bus" or not isinstance(by, Client) or not by.owed:
+            self._judge_stopped(by if isinstance(by, str) else by.name)
+        return f"{by if isinstance(by, str) else by.name} {pdu.hex()}"
+
+    def _judge_stopped(self, by: str) -> None:
+        state, word = State(self.world.wired.word("state")), self.world.wired.word("control_word")
+        volts = self.world.wired.loop.decision.voltage_v  # type: ignore[union-attr]
+        if word & 1 or state in (State.RAMPING, State.HOLDING) or (state is not State.CALIBRATING and volts):
+            self.judge.broken.append(f"{by} has stopped, and it is {state.name} with {word:#x} at {volts:.3f} V")
+
+    def _use_tools(self) -> str:
+        told = self.tools.act(self.judge.look, differences)
+        self.judge.is_disturbed |= self.tools.disturbs
+        return told
+
+    def _look_around(self) -> None:
+        for client in self.clients:
+            client.collect()
+            client.judge_time()
+        for one in (*self.clients, self.bus, self.tools):
+            self.judge.broken += one.broken
+        if self.keeper:
+            self.keeper.judge_time()
+            self.judge.broken += self.keeper.broken
+            if self.keeps and not self.judge.is_disturbed and (state := self.world.wired.state) not in PRESSING:
+                self.judge.broken.append(
+                    f"the force of who keeps it is gone: {state.name}, {self.world.wired.log[-3:]}"
+                )
+        self.judge.look_around()
+
+    def _end(self) -> None:
+        for _ in range(15):  # whoever has asked more than its address may waits for its turn
+            self.world.run(0.2)
+            self._look_around()
+            if not any(one.owed for one in self.clients):
+                break
+        self.judge.end()
+        owed = [one for one in self.clients if one.owed and not one.is_closed]
+        self.judge.broken += [f"{one.name} is owed {len(one.owed)} answers" for one in owed]
+
+
+def told(scene: Scene) -> str:
+    return json.dumps([f"seed {scene.seed}", *scene.judge.told[-8:], *scene.judge.broken[:4]], indent=1)
