@@ -225,10 +225,11 @@ class ActiveRun:
             return step.voltage_v
         if not isinstance(run, LadderRun):
             return None
-        if not run.leave_out(now_s, step.highest_v, was_there=was_reached):
+        stands_v = min(present_v, step.voltage_v)
+        if not run.leave_out(now_s, step.highest_v, stands_v, was_there=was_reached):
             return None
         self.message = self._too_high(step.highest_v, "the run goes on with the stairs below")
-        return min(present_v, step.voltage_v)
+        return stands_v
 
     def _too_high(self, voltage_v: float, what_now: str) -> str:
         return (

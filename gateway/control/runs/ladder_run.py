@@ -135,11 +135,11 @@ class LadderRun:
         """The branch that the plant is on: 1 rising, -1 falling."""
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
-    def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
+    def leave_out(self, now_s: float, voltage_v: float, stands_v: float, *, was_there: bool) -> bool:
         """Leave out every stair as high as this voltage; return whether any stair is left.
 
-        was_there: the output has been at this voltage. If not, the smaller stairs of the ladder may still try after a
-        check, and the same stair is no other one on the way down.
+        stands_v: what stays out until the next reading. was_there: the output has been at this voltage. If not, the smaller
+        stairs of the ladder may still try after a check, and the same stair is no other one on the way down.
         """
         phase = self._stair.phase
         tries_again = phase is CalibrationPhase.CHECK and not was_there
@@ -152,7 +152,7 @@ class LadderRun:
         if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
             left = left[1:]
         self.stairs = (*self.stairs[: self.done], *left)
-        self._stair_s, self._from_v = now_s, self._out_v
+        self._stair_s, self._from_v, self._out_v = now_s, stands_v, stands_v
         self._window.clear()
         self._trace.clear()
         return bool(left)
