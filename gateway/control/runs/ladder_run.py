@@ -139,7 +139,8 @@ class LadderRun:
         """Leave out every stair as high as this voltage; return whether any stair is left.
 
         stands_v: what stays out until the next reading. was_there: the output has been at this voltage. If not, the smaller
-        stairs of the ladder may still try after a check, and the same stair is no other one on the way down.
+        stairs of the ladder may still try after a check, and the same stair is no other one on the way down. So is none
+        that a stair was to lead down to which is left out.
         """
         phase = self._stair.phase
         tries_again = phase is CalibrationPhase.CHECK and not was_there
@@ -148,14 +149,22 @@ class LadderRun:
             for stair in self.stairs[self.done :]
             if stair.voltage_v < voltage_v or (tries_again and stair.phase is not phase)
         ]
-        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
-        if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
-            left = left[1:]
-        self.stairs = (*self.stairs[: self.done], *left)
+        self.stairs = (*self.stairs[: self.done], *self._without_climbs(left, was_there=was_there))
         self._stair_s, self._from_v, self._out_v = now_s, stands_v, stands_v
         self._window.clear()
         self._trace.clear()
-        return bool(left)
+        return self.done < len(self.stairs)
+
+    def _without_climbs(self, stairs: list[PlannedStair], *, was_there: bool) -> list[PlannedStair]:
+        """Leave out what is meant as a way down, and would be climbed to: the stair that it came down from is left out."""
+        kept: list[PlannedStair] = []
+        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        for stair in stairs:
+            is_climb = stair.direction < 0 and stair.voltage_v >= last_v
+            if not is_climb or (was_there and not kept):
+                kept.append(stair)
+                last_v = stair.voltage_v
+        return kept
 
     @property
     def _stair(self) -> PlannedStair:

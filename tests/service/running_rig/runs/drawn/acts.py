@@ -93,6 +93,7 @@ def stop(scene: "Scene") -> None:
     elif way == "hangs":
         scene.beating ^= {master.host}
         scene.judge.is_disturbed = True
+        scene.judge.befallen.add("hangs")
         scene.note(f"{master.host} {'beats' if master.host in scene.beating else 'hangs'}")
     elif way == "disk":
         _fill_disk(scene)
@@ -172,7 +173,7 @@ def meddle(scene: "Scene") -> None:
             scene.write(master, 0, *block, name="writes the block as it is")
         case "payload":
             if scene.write(master, 9, draw.choice((0, 300)), name="writes a payload"):
-                scene.judge.note_event()  # there is none
+                scene.judge.note_event("payload")  # there is none
         case "dry run":
             state = scene.judge.state
             scene.ask(Asked(), "dry run", lambda: rig.runs.answer({"plan": {"step_v": 1.0}, "dry_run": True}))

@@ -7,16 +7,19 @@ from gateway.bsfm.model import Response
 from gateway.control import CalibrationInUse
 from gateway.control.compensation.compensation import NO_COMPENSATION, Compensation, TimingCompensation
 from tests.control.bench import bsfm
+from tests.service.running_rig.runs.drawn import acts
 from tests.service.running_rig.simulated_rig import TICK_S
 
 if TYPE_CHECKING:
     from tests.service.running_rig.runs.drawn.scene import Scene
 
-SHORT_S: Final = 0.02, 0.04, 0.08, 0.15, 0.4, 1.2
+STALL_S: Final = 0.1
+SHORT_S: Final = 0.02, 0.04, 0.08, 0.15, 0.4, 1.2, 4.0
 
 
 def for_a_while(scene: "Scene", begin: Callable[[], object], end: Callable[[], object]) -> None:
-    scene.judge.note_event()
+    """As told last."""
+    scene.judge.note_event(scene.told[-1].partition(" ")[2])
     begin()
     scene.rig.run(scene.draw.choice(SHORT_S))
     scene.judge.note_event()
@@ -115,8 +118,13 @@ def machine(scene: "Scene") -> None:
     """It stands still, or sleeps."""
     seconds, is_suspended = scene.draw.choice((0.05, 0.09, 0.13, 0.5, 3.0)), scene.draw.random() < 0.4
     scene.note(f"{'sleeps' if is_suspended else 'stands still'} for {seconds} s")
-    scene.judge.note_event()
+    scene.judge.note_event("machine")
     scene.rig.stand_still(seconds, is_suspended=is_suspended)
+    if scene.rig.relay is None and scene.draw.random() < 0.5:
+        running = scene.laws.run
+        acts.begin(scene)
+        if scene.laws.run is not running and seconds > STALL_S:
+            scene.judge.complain("a run has begun by what has waited")
     scene.rig.run(TICK_S)
 
 
@@ -124,7 +132,7 @@ def restart(scene: "Scene") -> None:
     """The process is killed; the guardian writes the safe voltage, and a new one is there some time later."""
     rig = scene.rig
     scene.note("killed")
-    scene.judge.note_event()
+    scene.judge.note_event("killed")
     rig.wire.set_voltage(rig.settings.limits.safe_voltage_v, rig.now())
     for _ in range(scene.draw.choice((2, 20))):
         rig.pass_by()
@@ -146,7 +154,7 @@ def heal(scene: "Scene") -> None:
     """All is as it was made."""
     rig = scene.rig
     scene.note("healed")
-    scene.judge.note_event()
+    scene.judge.note_event("healed")
     plant = rig.plant
     plant.contact = plant.air = True
     plant.unit, rig.outside_n = 1.0, 0.0

@@ -7,11 +7,27 @@ rig are all that it knows.
 from math import isfinite
 
 from gateway.codes.faults import FaultCode
+from gateway.control import LeaseAction
 from gateway.registers.words import State
-from tests.service.running_rig.runs.drawn.run_laws import SEEN_S, RunLaws
+from tests.service.running_rig.runs.drawn.run_laws import SEEN_S, RunLaws, model
 from tests.service.running_rig.runs.drawn.run_rig import RunRig
 
 ON = State.READY, State.RAMPING, State.HOLDING, State.CALIBRATING
+CAUSES = {
+    FaultCode.SAMPLE_STALE: ("cell silent", "cell garbled", "cell away", "machine"),
+    FaultCode.SAMPLE_FROZEN: ("cell frozen",),
+    FaultCode.MASTER_LOST: ("hangs",),
+    FaultCode.OUTPUT_SILENT: ("output unanswered", "output deaf"),
+    FaultCode.OUTPUT_REFUSED: ("output refuses",),
+    FaultCode.OUTPUT_LOST: ("output away",),
+    FaultCode.WATCHDOG_TRIPPED: ("output tripped",),
+    FaultCode.LOOP_STALLED: ("machine",),
+    FaultCode.VALVE_SILENT: ("valve silent", "valve away"),
+    FaultCode.VALVE_ALTERED: ("valve stuck",),
+}
+"""Of each fault what alone it may be told of; of the others, whatever has befallen the rig."""
+FROZEN_S, FROZEN_N = 2.0, 3.0
+"""A cell that repeats itself for so long, while the force must have changed by so much."""
 FAR_N = 13.0
 """Beyond over_force_n it is over-force, whatever zero a tare has taken."""
 
@@ -24,6 +40,9 @@ class Judge:
         self.rig, self.laws = rig, RunLaws(rig)
         self.is_disturbed = self.begins = False
         self.taken_by: str | None = None
+        self.befallen: set[str] = set()
+        self._frozen_v: float | None = None
+        self._moved_s = 0.0
         self._state, self._volts = State.OFF, rig.wire.voltage_v
         self._overs, self._heard, self._lines = 0, len(rig.heard), len(rig.log)
         self._changed_s = rig.now()
@@ -56,8 +75,9 @@ class Judge:
         self.laws.look(state)
         self._state = state
 
-    def note_event(self) -> None:
+    def note_event(self, kind: str = "") -> None:
         """Something is befalling the rig now."""
+        self.befallen.add(kind)
         self.is_disturbed, self._changed_s = True, self.rig.now()
         if run := self.laws.run:
             run.is_odd, run.flaws = True, ()
@@ -102,6 +122,8 @@ class Judge:
             self.complain(f"{code.code} is not in the log: {said}")
         if state is State.FAULT and not self.is_disturbed:
             self.complain(f"{said} though nothing has happened")
+        if state is State.FAULT and not self.befallen.intersection(CAUSES.get(code, self.befallen or {""})):
+            self.complain(f"{said} though only {sorted(self.befallen)} has happened")
         if state not in ON and before in ON:
             if (rig.word("control_word"), rig.word("force_setpoint")) != (0, 0):
                 self.complain(f"control_word {rig.word('control_word')} stands behind the end")
@@ -125,5 +147,23 @@ class Judge:
             self.complain(f"{state.name} without an answer for {unanswered_s:.2f} s")
         if wire.how in ("refuses", "tripped", "away") and now_s - self._changed_s > 2 * SEEN_S:
             self.complain(f"{state.name} while the output is {wire.how}")
+        self._judge_frozen(state, now_s)
+        needs_beats = bounds.lease_s and bounds.lease_action is LeaseAction.FAULT and not self.laws.run
+        if needs_beats and now_s - self.laws.beaten_s > (bounds.lease_s or 0.0) + SEEN_S:
+            self.complain(f"{state.name} {now_s - self.laws.beaten_s:.2f} s behind its master's last beat")
         if self._overs > limits.over_force_samples:
             self.complain(f"{state.name} at {heard[-1][1]:.1f} N")
+
+    def _judge_frozen(self, state: State, now_s: float) -> None:
+        """Of a run's voltage alone: what a force that is held makes of a cell that repeats itself is asked elsewhere."""
+        rig = self.rig
+        if rig.cell != "frozen" or state is not State.CALIBRATING:
+            self._frozen_v = None
+            return
+        if self._frozen_v is None:
+            self._frozen_v, self._moved_s = rig.wire.voltage_v, now_s
+        moved_n = abs(model().force_n(rig.wire.voltage_v, 1.0) - model().force_n(self._frozen_v, 1.0))
+        if moved_n < FROZEN_N or not rig.plant.contact:
+            self._moved_s = now_s
+        if now_s - self._moved_s > FROZEN_S:
+            self.complain(f"a run goes on {now_s - self._moved_s:.1f} s behind a cell that repeats itself")

@@ -8,7 +8,7 @@ from typing import Final
 
 from gateway.codes.faults import FaultCode
 from gateway.modbus import Peer
-from gateway.registers.words import CalibrationPhase, SelfTestResult, SelfTestVerdict, State
+from gateway.registers.words import CalibrationPhase, SelfTestResult, SelfTestVerdict, State, StatusBit
 from gateway.service.running_rig.calibration_runs import FOLLOWED_S
 from tests.control.bench import bsfm
 from tests.service.running_rig.runs.drawn.run_rig import RunRig
@@ -130,6 +130,8 @@ class RunLaws:
         self._judge_force(run, now_s)
         self._judge_who(run, now_s)
         if rig.ticks % 10 == 0:
+            if rig.word("status_word") & (StatusBit.ENABLED | StatusBit.READY) != StatusBit.ENABLED:
+                self.complain(f"status_word is {rig.word('status_word'):#x} in a run")
             is_test = rig.word("self_test_result") == SelfTestResult.RUNNING
             if is_test is not (run.kind == "self-test") and not run.is_ramping:
                 self.complain(f"self_test_result is {rig.word('self_test_result')} in a {run.kind}")

@@ -102,6 +102,8 @@ class Scene:
                 self.note(f"{said}: {refusal}"[:160])
             if (judge.state, rig.wire.voltage_v) != before:
                 judge.complain(f"{name} was refused, and {before} became {judge.state.name}, {rig.wire.voltage_v} V")
+            if isinstance(refusal, Refusal) and rig.word("refusal_reason") != refusal.reason:
+                judge.complain(f"refusal_reason is {rig.word('refusal_reason')} behind {refusal}")
             return False
         if name:
             self.note(said)
@@ -110,6 +112,8 @@ class Scene:
         if rig.word("heartbeat") != beat or rig.bank.owner != owner:
             laws.beaten_s = rig.now()
         if judge.state is State.CALIBRATING and laws.run is None:
+            if Fits.answer:
+                judge.complain("a run begins while the last ladder is being fitted")
             if before[1] > resting_v:
                 judge.complain(f"a run begins from {before[0].name} with {before[1]:.2f} V")
             laws.begin(asked, self.scale, since, is_odd=not self.is_whole)
