@@ -167,6 +167,11 @@ class LadderRun:
         return kept
 
     @property
+    def next_v(self) -> float:
+        """Voltage of the stair that is under way, V."""
+        return self._stair.voltage_v
+
+    @property
     def _stair(self) -> PlannedStair:
         return self.stairs[min(self.done, len(self.stairs) - 1)]
 

@@ -54,3 +54,19 @@ def test_what_was_a_way_down_is_not_climbed_to_where_its_top_is_left_out() -> No
     for stair in run.stairs:
         volts.append(stair.voltage_v)
         assert stair.direction > 0 or volts[-1] < volts[-2], f"{volts[-2]:.2f} V down to {volts[-1]:.2f} V"
+
+
+def test_what_follows_a_stair_that_is_left_out_is_judged_as_well() -> None:
+    """Nobody looked at the next one of the walk, which went out at once: 32 N pressed of 30."""
+    control = settings(response_lag_s=0.25)
+    bench = Bench(
+        replace(control, limits=replace(control.limits, force_max_n=30.0)),
+        gain_n_per_v=11.43,
+        friction_n=2.1,
+        lag_s=0.032,
+    )
+    bench.run(1.0)
+    bench.controller.active_run.ask(replace(SHORT, step_v=0.9, minor_points=13))
+    bench.seconds_until(lambda output: output.calibration_phase == CalibrationPhase.FITTING, 40.0)
+    assert max(record.force_n for record in bench.history) <= 30.0
+    assert bench.last.calibration_phase == CalibrationPhase.FITTING, bench.events
