@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from tests.service.running_rig.runs.drawn.scene import Scene
 
 MASTERS: Final = OWNER, OTHER, Peer("10.0.0.7", 4003)
+QUIET_LEAVES_OUT: Final = "calibration", "self-test"
+"""A master's ladder lasts for minutes."""
 BITS: Final = {"calibration": CALIBRATE, "self-test": SELF_TEST}
 MOVES: Final = (
     {"do": "step", "to_share": 0.6, "hold_s": 1.0},
@@ -31,7 +33,7 @@ def begin(scene: "Scene") -> None:
     draw, master = scene.draw, scene.draw.choice(MASTERS)
     if scene.rig.relay:
         push(scene, master)
-    kind = draw.choice(("calibration", "self-test", "self-test", "here", "here", "experiment"))
+    kind = draw.choice(("self-test", "here", "here", "experiment", *QUIET_LEAVES_OUT * (not scene.is_quiet)))
     if kind not in BITS:
         _begin_here(scene, kind)
     elif draw.random() < 0.25:

@@ -17,7 +17,9 @@ def draw_rig(draw: Random, folder: Path, seed: int) -> RunRig:
     gain_n_per_v = draw.uniform(6.0, draw.choice((9.0, 9.0, 13.0)))
     friction_n, lag_s = draw.uniform(0.3, 2.2), draw.uniform(0.04, 0.12)
     plant = {"gain_n_per_v": gain_n_per_v, "friction_n": friction_n, "lag_s": lag_s}
-    return RunRig(_draw_control(draw, period_ticks), folder, period_ticks, seed=seed, **plant)
+    rig = RunRig(_draw_control(draw, period_ticks), folder, period_ticks, seed=seed, **plant)
+    rig.curve_per_v = 0.0 if rig.relay else draw.choice((0.0, draw.uniform(-0.03, 0.03)))
+    return rig
 
 
 def _draw_control(draw: Random, period_ticks: int) -> ControlSettings:

@@ -23,6 +23,7 @@ END: Final = re.compile(
 WHY: Final = re.compile(r"stopped|done after|done:|disabled by|A3\d\d|A4\d\d")
 TOLD: Final = re.compile(r"self-test ([a-z ]+) (passed|warned|failed|not tested): ")
 ITEMS: Final = "noise", "resolution", "zero", "sign", "scale", "response", "leak", "output_line", "cell_line"
+FAULTS: Final = {code.code for code in FaultCode} - {"", FaultCode.MASTER_LOST.code}
 ENDS: Final = (
     CalibrationPhase.FITTING,
     CalibrationPhase.STOPPED,
@@ -181,6 +182,9 @@ class RunLaws:
             self.complain(f"why the {run.kind} has ended is not in the log: {said}")
         if run.flaws and phase is CalibrationPhase.FITTING:
             self.complain(f"a ladder is fitted of a tool with {run.flaws}")
+        faults = [line for line in said if line.split(" ")[0] in FAULTS]
+        if faults and state is not State.FAULT:
+            self.complain(f"{state.name} behind {faults}")
         if run.kind == "self-test":
             self._judge_report(run, said)
 
@@ -201,6 +205,12 @@ class RunLaws:
         passes = worst is PASSED and result is SelfTestResult.PASSED and (not code or run.is_ramping)
         if is_well and not passes:
             self.complain(f"{result.name} with {worst.name} and {code.name}")
+        if (
+            code not in (FaultCode.NONE, FaultCode.MASTER_LOST)
+            and not run.is_ramping
+            and result is not SelfTestResult.FAILED
+        ):
+            self.complain(f"{result.name} behind {code.name}")
         if worst is FAILED and result not in (SelfTestResult.FAILED, SelfTestResult.STOPPED):
             self.complain(f"{result.name} though an item has failed")
         passed = {item for item, verdict in verdicts.items() if verdict is PASSED}

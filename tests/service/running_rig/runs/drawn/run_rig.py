@@ -100,7 +100,8 @@ class Fits:
 
 class RunRig(SmallRig):
     """cell: `well`, `silent`, `frozen`, `garbled`; cell_late: readings that a reading comes late by; outside_n: force that
-    neither slide nor gateway knows of; period_ticks: of its readings. heard: (s, N) of each reading that came."""
+    neither slide nor gateway knows of; period_ticks: of its
+    readings; curve_per_v: by how much it grows stronger with each volt. heard: (s, N) of each reading that came."""
 
     def __init__(self, control: ControlSettings, folder: Path, period_ticks: int, *, seed: int, **plant: float) -> None:
         self.cell, self.cell_late, self.outside_n, self.false_n = "well", 0, 0.0, 0.0
@@ -110,6 +111,7 @@ class RunRig(SmallRig):
         self.folder, self._period_ticks = folder, period_ticks
         self.on_tick: Callable[[], None] = lambda: None
         self.relay: DrawnRelay | None = None
+        self.curve_per_v, self._gain_n_per_v = 0.0, plant["gain_n_per_v"]
         super().__init__(control, seed=seed, **plant)
         self.beats = False
 
@@ -140,6 +142,8 @@ class RunRig(SmallRig):
     def pass_by(self) -> None:
         """One tick of the world alone."""
         self.ticks += 1
+        if self.curve_per_v:
+            self.plant.gain_n_per_v = self._gain_n_per_v * (1.0 + self.curve_per_v * self.plant._pressure)
         self.plant.advance(self.wire.device_v, 10)
         self._felt.append(self.plant.reading_n() + self.plant.sign * self.outside_n)
 
@@ -176,7 +180,7 @@ class RunRig(SmallRig):
 
     def make_as_calibrated(self) -> None:
         """As strong as the calibration says, whichever way it works."""
-        self.plant.gain_n_per_v = AS_CALIBRATED_N_PER_V
+        self.plant.gain_n_per_v, self.curve_per_v = AS_CALIBRATED_N_PER_V, 0.0
         if self.relay:
             self.relay._push_n_per_v = AS_CALIBRATED_N_PER_V
             self.plant.gain_n_per_v *= SHARE if self.relay.stands is ValveDirection.PULL else 1.0

@@ -25,7 +25,7 @@ RUNS = {CALIBRATE: "calibration", SELF_TEST: "self-test"}
 
 
 class Scene:
-    """told: what has happened, for who reads of a law that did not hold."""
+    """told: what has happened, for who reads of a law that did not hold. is_quiet: one run after the other, nothing else."""
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.seed, self.draw = seed, (draw := Random(seed))
@@ -37,7 +37,7 @@ class Scene:
         self.beats = {master.host: 5000 * number for number, master in enumerate(MASTERS)}
         self.beating = set(self.beats)
         self.is_followed, self.scale, self.calibration = False, 1.0, 1
-        self.pace = draw.choice((0.5, 1.0, 4.0))
+        self.pace, self.is_quiet = draw.choice((0.5, 1.0, 4.0)), draw.random() < 0.25
         Fits.answer = None
 
     # -- time
@@ -147,7 +147,12 @@ class Scene:
 
     def _act(self) -> None:
         draw, state = self.draw, self.judge.state
-        if state is State.FAULT and draw.random() < 0.7:
+        if self.is_quiet and state is not State.FAULT:
+            acts.begin(self)
+            while self.judge.state is State.CALIBRATING and not self.judge.broken:
+                self.rig.run(0.5)
+            acts.fit(self)
+        elif state is State.FAULT and draw.random() < 0.7:
             events.heal(self)
             self.rig.run(1.5)
             if acts.reset(self):
