@@ -10,6 +10,9 @@ from tests.control.bench import settings
 from tests.control.valve.valve_bench import SHARE
 from tests.service.running_rig.runs.drawn.run_rig import RunRig
 
+SLOW_TICKS = 4
+"""A cell that speaks so seldom is thought frozen, with right, where no noise shows in what it says."""
+
 
 def draw_rig(draw: Random, folder: Path, seed: int) -> RunRig:
     """A rig of any kind that has runs; one in three may be stronger than its calibration says, up to twice."""
@@ -18,6 +21,7 @@ def draw_rig(draw: Random, folder: Path, seed: int) -> RunRig:
     friction_n, lag_s = draw.uniform(0.3, 2.2), draw.uniform(0.04, 0.12)
     plant = {"gain_n_per_v": gain_n_per_v, "friction_n": friction_n, "lag_s": lag_s}
     rig = RunRig(_draw_control(draw, period_ticks), folder, period_ticks, seed=seed, **plant)
+    rig.plant.noise_n = rig.noise_n = 0.04 if period_ticks < SLOW_TICKS else 0.1
     rig.curve_per_v = 0.0 if rig.relay else draw.choice((0.0, draw.uniform(-0.03, 0.03)))
     return rig
 

@@ -35,7 +35,9 @@ def cell(scene: "Scene") -> None:
         for_a_while(scene, lambda: setattr(rig, "cell_late", draw.randint(1, 10)), lambda: setattr(rig, "cell_late", 0))
     elif how == "noisy":
         noise_n = draw.choice((0.3, 1.0, 3.0))
-        for_a_while(scene, lambda: setattr(rig.plant, "noise_n", noise_n), lambda: setattr(rig.plant, "noise_n", 0.04))
+        for_a_while(
+            scene, lambda: setattr(rig.plant, "noise_n", noise_n), lambda: setattr(rig.plant, "noise_n", rig.noise_n)
+        )
     elif how == "false":
         for_a_while(scene, lambda: setattr(rig, "false_n", draw.choice((-60.0, -9.0, 9.0, 60.0, 200.0))), lambda: None)
     elif how == "away":
@@ -51,7 +53,7 @@ def _unplug_cell(scene: "Scene") -> None:
 
 def _heal_cell(scene: "Scene") -> None:
     rig = scene.rig
-    rig.cell, rig.cell_late, rig.loop.cell_lost, rig.plant.noise_n = "well", 0, False, 0.04
+    rig.cell, rig.cell_late, rig.loop.cell_lost, rig.plant.noise_n = "well", 0, False, rig.noise_n
 
 
 def output(scene: "Scene") -> None:

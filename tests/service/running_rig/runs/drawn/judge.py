@@ -28,8 +28,10 @@ CAUSES = {
 """Of each fault what alone it may be told of; of the others, whatever has befallen the rig."""
 FROZEN_S, FROZEN_N = 2.0, 3.0
 """A cell that repeats itself for so long, while the force must have changed by so much."""
-FAR_N = 13.0
-"""Beyond over_force_n it is over-force, whatever zero a tare has taken."""
+TOUCHING_N = 1.0
+"""In free air a quiet cell repeats itself rightly; how far a ladder climbs beside one that does, its stairs say."""
+PAYLOAD_N = 3.5
+"""The most that a payload of a scene may add to what the cell says."""
 
 
 class Judge:
@@ -136,7 +138,9 @@ class Judge:
         rig, bounds, limits, now_s = self.rig, self.rig.settings.supervision, self.rig.settings.limits, self.rig.now()
         heard, self._heard = rig.heard[self._heard :], len(rig.heard)
         for _, said_n in heard:
-            self._overs = self._overs + 1 if abs(said_n) >= limits.over_force_n + FAR_N else 0
+            self._overs = (
+                self._overs + 1 if abs(said_n - rig.controller.zero_n) >= limits.over_force_n + PAYLOAD_N else 0
+            )
         if state not in ON:
             return
         silent_s, wire = now_s - rig.silent_since_s(), rig.wire
@@ -152,7 +156,7 @@ class Judge:
         if needs_beats and now_s - self.laws.beaten_s > (bounds.lease_s or 0.0) + SEEN_S:
             self.complain(f"{state.name} {now_s - self.laws.beaten_s:.2f} s behind its master's last beat")
         if self._overs > limits.over_force_samples:
-            self.complain(f"{state.name} at {heard[-1][1]:.1f} N")
+            self.complain(f"{state.name} at {rig.heard[-1][1]:.1f} N")
 
     def _judge_frozen(self, state: State, now_s: float) -> None:
         """Of a run's voltage alone: what a force that is held makes of a cell that repeats itself is asked elsewhere."""
@@ -163,7 +167,7 @@ class Judge:
         if self._frozen_v is None:
             self._frozen_v, self._moved_s = rig.wire.voltage_v, now_s
         moved_n = abs(model().force_n(rig.wire.voltage_v, 1.0) - model().force_n(self._frozen_v, 1.0))
-        if moved_n < FROZEN_N or not rig.plant.contact:
+        if moved_n < FROZEN_N or not rig.plant.contact or abs(rig.heard[-1][1]) < TOUCHING_N:
             self._moved_s = now_s
         if now_s - self._moved_s > FROZEN_S:
             self.complain(f"a run goes on {now_s - self._moved_s:.1f} s behind a cell that repeats itself")

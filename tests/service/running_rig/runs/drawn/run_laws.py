@@ -17,9 +17,7 @@ STOP_S: Final = 4.0
 """The longest way to 0 N."""
 SEEN_S: Final = 0.021
 """Two ticks: one until it is seen, one until it is decided."""
-END: Final = re.compile(
-    r"^(self-test|calibration|experiment)( ladder| \S+)? (done|stopped)|A330 .* stopped|the run is stopped$"
-)
+END: Final = re.compile(r"(self-test|calibration|experiment)( ladder| \S+)? (done|stopped)|the run is stopped$")
 WHY: Final = re.compile(r"stopped|done after|done:|disabled by|A3\d\d|A4\d\d")
 TOLD: Final = re.compile(r"self-test ([a-z ]+) (passed|warned|failed|not tested): ")
 ITEMS: Final = "noise", "resolution", "zero", "sign", "scale", "response", "leak", "output_line", "cell_line"

@@ -105,6 +105,7 @@ class RunRig(SmallRig):
 
     def __init__(self, control: ControlSettings, folder: Path, period_ticks: int, *, seed: int, **plant: float) -> None:
         self.cell, self.cell_late, self.outside_n, self.false_n = "well", 0, 0.0, 0.0
+        self.noise_n = 0.04
         self.heard: list[tuple[float, float]] = []
         self._felt: deque[float] = deque(maxlen=12)
         self._said_n = 0.0

@@ -130,7 +130,13 @@ class Scene:
         obeys = relay is None or (relay.is_stuck, relay.silent_s, relay.lost) == (False, None, False)
         is_zero = abs(rig.controller.zero_n) < 0.3 and rig.word("payload") == 0
         is_right = rig.relay is not None or plant.sign > 0.0
-        return told == (True, True, 1.0, 0.0, "well", 0) and plant.noise_n < 0.1 and is_zero and obeys and is_right
+        return (
+            told == (True, True, 1.0, 0.0, "well", 0)
+            and plant.noise_n == rig.noise_n
+            and is_zero
+            and obeys
+            and is_right
+        )
 
     # -- the scene
 
