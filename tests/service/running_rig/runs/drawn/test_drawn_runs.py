@@ -11,7 +11,7 @@ import pytest
 from tests.service.running_rig.runs.drawn.run_rig import Fits
 from tests.service.running_rig.runs.drawn.scene import Scene
 
-SCENES = 10
+SCENES = 8
 KEPT = 5101, 98
 """A stair that had just been left out pressed until the next reading came; a partial reversal pressed what was never tried."""
 
