@@ -11,9 +11,10 @@ import pytest
 from tests.service.running_rig.runs.drawn.run_rig import Fits
 from tests.service.running_rig.runs.drawn.scene import Scene
 
-SCENES = 8
-KEPT = 5101, 98
-"""A stair that had just been left out pressed until the next reading came; a partial reversal pressed what was never tried."""
+SCENES = 7
+KEPT = 5101, 98, 157
+"""A stair that had just been left out pressed until the next reading came; a partial reversal pressed what was never tried;
+nobody follows an experiment any more."""
 
 
 def test_a_run_keeps_to_what_it_states_and_ends_with_its_reason_whatever_befalls_it(
