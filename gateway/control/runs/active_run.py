@@ -225,10 +225,14 @@ class ActiveRun:
             return step.voltage_v
         if not isinstance(run, LadderRun):
             return None
-        if not run.leave_out(now_s, step.highest_v, was_there=was_reached):
-            return None
-        self.message = self._too_high(step.highest_v, "the run goes on with the stairs below")
-        return min(present_v, step.voltage_v)
+        stands_v, highest_v = min(present_v, step.voltage_v), step.highest_v
+        while run.leave_out(now_s, highest_v, stands_v, was_there=was_reached):
+            self.message = self._too_high(highest_v, "the run goes on with the stairs below")
+            if not ceiling.is_beyond(run.next_v, run.noise_n):
+                return stands_v
+            highest_v, was_reached = run.next_v, False
+        self.message = ""
+        return None
 
     def _too_high(self, voltage_v: float, what_now: str) -> str:
         return (

@@ -135,11 +135,12 @@ class LadderRun:
         """The branch that the plant is on: 1 rising, -1 falling."""
         return float(self._stair.direction) if self._stair_s is not None and self.stairs else 1.0
 
-    def leave_out(self, now_s: float, voltage_v: float, *, was_there: bool) -> bool:
+    def leave_out(self, now_s: float, voltage_v: float, stands_v: float, *, was_there: bool) -> bool:
         """Leave out every stair as high as this voltage; return whether any stair is left.
 
-        was_there: the output has been at this voltage. If not, the smaller stairs of the ladder may still try after a
-        check, and the same stair is no other one on the way down.
+        stands_v: what stays out until the next reading. was_there: the output has been at this voltage. If not, the smaller
+        stairs of the ladder may still try after a check, and the same stair is no other one on the way down. So is none
+        that a stair was to lead down to which is left out.
         """
         phase = self._stair.phase
         tries_again = phase is CalibrationPhase.CHECK and not was_there
@@ -148,14 +149,27 @@ class LadderRun:
             for stair in self.stairs[self.done :]
             if stair.voltage_v < voltage_v or (tries_again and stair.phase is not phase)
         ]
-        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
-        if not was_there and left and left[0].direction < 0 and left[0].voltage_v >= last_v:
-            left = left[1:]
-        self.stairs = (*self.stairs[: self.done], *left)
-        self._stair_s, self._from_v = now_s, self._out_v
+        self.stairs = (*self.stairs[: self.done], *self._without_climbs(left, was_there=was_there))
+        self._stair_s, self._from_v, self._out_v = now_s, stands_v, stands_v
         self._window.clear()
         self._trace.clear()
-        return bool(left)
+        return self.done < len(self.stairs)
+
+    def _without_climbs(self, stairs: list[PlannedStair], *, was_there: bool) -> list[PlannedStair]:
+        """Leave out what is meant as a way down, and would be climbed to: the stair that it came down from is left out."""
+        kept: list[PlannedStair] = []
+        last_v = self.stairs[self.done - 1].voltage_v if self.done else self._rest_v
+        for stair in stairs:
+            is_climb = stair.direction < 0 and stair.voltage_v >= last_v
+            if not is_climb or (was_there and not kept):
+                kept.append(stair)
+                last_v = stair.voltage_v
+        return kept
+
+    @property
+    def next_v(self) -> float:
+        """Voltage of the stair that is under way, V."""
+        return self._stair.voltage_v
 
     @property
     def _stair(self) -> PlannedStair:

@@ -1,7 +1,8 @@
 """Keep a run below the rig's largest force by what the load cell says, whatever the calibration in use expects.
 
 Two checks. Before a higher stair: were the force to go on as it rose from the stair before to this one, in the shape of the
-calibration in use, it must not pass the ceiling. And at every sample of a rising stair, for what rises otherwise. The
+calibration in use, it must not pass the ceiling; nor as it rose to the highest stair so far, for behind a way down, and amid
+friction, the stairs just before tell nothing. And at every sample of a rising stair, for what rises otherwise. The
 ceiling is force_max_n less what noise makes of single readings. On the way down what the top has reached may still stand, but
 nothing beyond force_max_n: an output that is limited in its slope, or a lag, may rise long after the plan has turned.
 """
@@ -13,8 +14,10 @@ from gateway.bsfm import Bsfm
 from gateway.bsfm.ladder.plan import RISING
 from gateway.control.runs.ladder_run import LadderRow
 from gateway.control.sample_conditioning import Reading
+from gateway.registers.words import CalibrationPhase
 
 _SAMPLES: Final = 3  # in a row, as over-force takes; a mean of them would be reached by one false reading alone
+_HIGHER: Final = 1.02  # times the voltage of the highest stair: of a nearer one noise alone would tell the slope
 _LEAST_MARGIN_N: Final = 0.4  # below force_max_n: a few counts of a usual amplifier (0.1 N)
 _SIGMAS: Final = 3.0  # of the noise of single readings, where that is more
 
@@ -30,6 +33,8 @@ class ForceCeiling:
         self._given_n = 0.0
         self._last: tuple[float, float] | None = None
         self._before: tuple[float, float] | None = None
+        self._top: tuple[float, float] | None = None  # the highest stair of the ladder or its check
+        self._below_top: tuple[float, float] | None = None
         self._rest_n = 0.0
 
     @property
@@ -48,8 +53,15 @@ class ForceCeiling:
         self._rest_n = row.rest_n
         if row.stair.direction < 0:
             self._last = None
-        else:
-            self._before, self._last = self._last, (row.stair.voltage_v, row.force_n)
+            return
+        settled = row.stair.voltage_v, row.force_n
+        self._before, self._last = self._last, settled
+        if row.stair.phase is CalibrationPhase.MINOR_LOOPS:  # friction may have kept more, or less
+            return
+        if self._top is None or settled[0] > _HIGHER * self._top[0]:
+            self._below_top, self._top = self._top, settled
+        elif settled[0] >= self._top[0]:
+            self._top = settled
 
     def is_reached(self, noise_n: float) -> bool:
         """Return whether the force of now is as high as it may be."""
@@ -67,10 +79,20 @@ class ForceCeiling:
         return self._force_max_n - _margin_n(noise_n)
 
     def _expected_n(self, voltage_v: float) -> float:
-        """Cell force of a higher stair, by those below it; 0 where there is none to go by."""
-        if self._last is None or voltage_v <= self._last[0]:
+        """Cell force of a higher stair, by those below it, and by the highest that the ladder has been at: of partial
+        reversals those below it tell nothing behind a way down, and little amid friction. 0 where there is none to go by."""
+        expected_n = 0.0
+        if self._last:
+            expected_n = self._extrapolate(voltage_v, self._last, self._before or (self._rest_v, self._rest_n))
+        if self._top and self._below_top:
+            expected_n = max(expected_n, self._extrapolate(voltage_v, self._top, self._below_top))
+        return expected_n
+
+    def _extrapolate(self, voltage_v: float, last: tuple[float, float], before: tuple[float, float]) -> float:
+        """Go on as it rose from one stair (V, N) to the last; 0 for a stair that is no higher."""
+        (last_v, last_n), (before_v, before_n) = last, before
+        if voltage_v <= last_v:
             return 0.0
-        (last_v, last_n), (before_v, before_n) = self._last, self._before or (self._rest_v, self._rest_n)
         before_model_n, last_model_n, model_n = (
             self._model.force_n(volts, float(RISING)) for volts in (before_v, last_v, voltage_v)
         )

@@ -113,7 +113,7 @@ def test_what_was_too_much_once_is_left_out_and_tried_again_where_it_was_not_rea
     was_there: bool, left_v: list[float]
 ) -> None:
     run = run_of(stair(4.0, CHECK), stair(6.0, CHECK), stair(2.0), stair(5.0))
-    assert run.leave_out(10.0, 4.0, was_there=was_there)
+    assert run.leave_out(10.0, 4.0, 0.0, was_there=was_there)
     assert [one.voltage_v for one in run.stairs] == left_v
 
 

@@ -75,7 +75,7 @@ def test_a_stair_has_its_whole_time_though_another_was_left_out_before_it(voltag
     """Time and readings of the one that was too much are none of the next one's."""
     run, told = paced(4.0, 2.0)
     now_s, rows = feed(run, 0.7, 0.5, 30.0)
-    assert not rows and run.leave_out(now_s, 4.0, was_there=True)
+    assert not rows and run.leave_out(now_s, 4.0, 4.0, was_there=True)
     _, rows = feed(run, now_s, UNKNOWN_BLIND_S + 0.5 * WINDOW_S, voltage_v)
     assert not rows, "its transient may not be over"
     _, rows = feed(run, now_s + UNKNOWN_BLIND_S + 0.5 * WINDOW_S, WINDOW_S, voltage_v)
@@ -102,7 +102,7 @@ def test_a_ramp_to_the_next_stair_begins_where_the_one_that_is_left_out_was_ende
     run, _ = paced(4.0, 3.0, ramp_s=1.0)
     half_way_v = [output_v(run, 0.6 + 0.01 * k) for k in range(50)][-1]
     assert 1.0 < half_way_v < 3.0
-    assert run.leave_out(1.1, 4.0, was_there=False)
+    assert run.leave_out(1.1, 4.0, half_way_v, was_there=False)
     assert output_v(run, 1.1) == pytest.approx(half_way_v)
 
 
@@ -112,7 +112,7 @@ def test_a_falling_stair_that_nobody_would_fall_to_is_left_out_with_those_above(
 ) -> None:
     """At the beginning the output is at rest: 2 V are climbed to then, and would be measured on the wrong branch."""
     run = run_of(stair(4.0, CHECK), stair(2.0, CHECK, -1), stair(1.0, CHECK), stair(6.0))
-    assert run.leave_out(1.0, 4.0, was_there=was_there)
+    assert run.leave_out(1.0, 4.0, 0.0, was_there=was_there)
     assert [one.voltage_v for one in run.stairs] == left_v
 
 

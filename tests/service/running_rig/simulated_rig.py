@@ -136,12 +136,18 @@ class SmallRig:
         self.settings = control or settings()
         self.ticks = round(began_s / TICK_S)
         self.is_cell_silent = False
+        self.suspended_s = 0.0
         self.beats = self.settings.supervision.lease_s is not None
         self.beat = 0
         self.log: list[str] = []
         self.trace: list[tuple[State, float, float]] = []
         self.plant = SmallPlant(Random(seed), **plant)  # type: ignore[arg-type]
-        self.wire, self.samples = Wire(), Samples()
+        self.start(is_restarted=is_restarted)
+        self.run(0.5)
+
+    def start(self, *, is_restarted: bool = False) -> None:
+        """A fresh control process beside the same machine."""
+        self.wire, self.samples = self.new_wire(), Samples()
         rules = BankRules(
             rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
@@ -154,16 +160,13 @@ class SmallRig:
         )
         self.bank = RegisterBank(MAP, rules, now=self.now)
         self.controller = Controller(self.settings, CalibrationInUse(bsfm(), 1), unclean_restart=is_restarted)
-        self.loop = ControlLoop(
-            self.bank,
-            self.controller,
-            self.wire,
-            self.samples,
-            LoopProcess(self.now, self.note),  # type: ignore[arg-type]
-        )
+        process = LoopProcess(self.now, self.note, suspended_s=lambda: self.suspended_s)
+        self.loop = ControlLoop(self.bank, self.controller, self.wire, self.samples, process)  # type: ignore[arg-type]
         if self.settings.valve:
             self.loop.valve = Relay(self.plant)  # type: ignore[assignment]
-        self.run(0.5)
+
+    def new_wire(self) -> Wire:
+        return Wire()
 
     def now(self) -> float:
         return self.ticks * TICK_S

@@ -1,0 +1,26 @@
+"""Drawn scenes of all that presses without an enable: ladders, experiments and self-tests, by masters and by people at the
+machine, with other masters beside them, and whatever befalls lines, devices, process and tool meanwhile.
+
+A scene is one seed. The laws are the judge's own.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from tests.service.running_rig.runs.drawn.run_rig import Fits
+from tests.service.running_rig.runs.drawn.scene import Scene
+
+SCENES = 7
+KEPT = 5101, 98, 157
+"""A stair that had just been left out pressed until the next reading came; a partial reversal pressed what was never tried;
+nobody follows an experiment any more."""
+
+
+def test_a_run_keeps_to_what_it_states_and_ends_with_its_reason_whatever_befalls_it(
+    tmp_path: Path, budget: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Takes two and a half seconds of processor, a fifth of one for each scene of half a minute."""
+    monkeypatch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", Fits)
+    played = [Scene(seed, tmp_path).play() for seed in (*KEPT, *range(SCENES * budget))]
+    assert [(one.seed, one.judge.broken, one.told[-20:]) for one in played if one.judge.broken] == []
