@@ -26,6 +26,7 @@ from gateway.processes.durable_file import (
 from gateway.processes.state_directory import CALIBRATIONS
 from gateway.recording import RecordingError, read_header, read_table
 from gateway.recording.care.keeping import CLOSED_S
+from gateway.recording.errors import tell_unreadable
 from gateway.recording.reader import Recording, recording_paths
 
 _FOLDER: Final = "reference"
@@ -152,7 +153,7 @@ def why_no_reference(path: Path) -> str:
     try:
         recording = read_table(path)
     except (OSError, RecordingError) as error:
-        return str(error)
+        return tell_unreadable(error)
     return _why_it_says_little(recording)
 
 
