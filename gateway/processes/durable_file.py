@@ -213,6 +213,7 @@ def _write(directory: int, name: str, data: bytes) -> None:
 
 
 def sync_path(path: Path) -> None:
-    """Have a file's data, or a directory's names, put on the disk. OSError where it refuses."""
-    with closing_descriptor(os.open(path, os.O_RDONLY | os.O_CLOEXEC)) as descriptor:
+    """Have a file's data, or a directory's names, put on the disk. OSError where it refuses; a pipe in its place is not waited
+    for."""
+    with closing_descriptor(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)) as descriptor:
         os.fsync(descriptor)
