@@ -47,7 +47,7 @@ def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> I
 
 
 def verify_audit(state: Path) -> AuditVerdict:
-    """Follow the chain to its first break. FileNotFoundError where there is no audit, OSError where the disk does not give it."""
+    """Follow the chain to its first break. FileNotFoundError where there is no audit, OSError where it cannot be read."""
     folder = state / AUDIT
     head, files = read_head(folder), audit_files(folder)  # in this order: the files may grow meanwhile
     if files and head is None:  # it may begin just now

@@ -253,8 +253,8 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
 
 def test_one_that_is_looked_for_in_a_folder_that_may_not_be_read_is_refused_by_a_sentence(used, monkeypatch):
     """And not called unknown."""
-    monkeypatch.setattr(Path, "iterdir", lambda path: os.listdir(os.devnull + "/"))
-    with pytest.raises(StoreError, match="E432 .* cannot be read: Not a directory"):
+    monkeypatch.setattr(Path, "iterdir", lambda path: os.scandir(os.devnull + "/"))
+    with pytest.raises(StoreError, match=r"E432 .* cannot be read: Not a directory"):
         used.use(77)
 
 
