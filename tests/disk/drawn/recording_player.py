@@ -63,16 +63,11 @@ class RecordingPlayer(Player):
             sample = SimpleNamespace(time_s=self.scene.now_s, number=self.number)
             self.recordings.append(sample, None, None)  # type: ignore[arg-type]
         self.recordings.flush(self.scene.now_s)
-        self.judge_status()
+        said = self.recordings.status()
+        self.judge_words(f"{said.get('recording') or ''}{said.get('waits', '')}" or "-")
         held = sum(len(one._gathered) for one in (self.recordings._current, *self.recordings._closing) if one)
         if held > 2000:
             self.complain(f"{held} rows in memory")
-
-    def judge_status(self) -> None:
-        """What it says of itself is of a file that there was."""
-        assert self.recordings
-        said = self.recordings.status()
-        self.judge_words(f"{said.get('recording') or ''}{said.get('waits', '')}" or "-")
 
     def _await(self, what: str, answer: Future[Any]) -> None:
         answer.add_done_callback(lambda done: self._hear(what, done))
@@ -109,9 +104,7 @@ class RecordingPlayer(Player):
     def act(self) -> None:
         """The gateway is asked for one, or for its end."""
         assert self.recordings
-        if self.rng.random() < 0.15:
-            self.scene.note(f"status {self.recordings.status()}")
-        elif self.rng.random() < 0.65:
+        if self.rng.random() < 0.65:
             try:
                 label = RecordingLabel(self.rng.choice(LABELS))
                 answer = self.recordings.start(label, self.rng.choice([0.0, 0.0, 0.0, 7.0]))
