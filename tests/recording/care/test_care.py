@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from gateway.profiles.recordings_section import Retention
-from gateway.recording import Recorder, read_entry, recording_paths
+from gateway.recording import Recorder, recording_paths
 from gateway.recording.care import keeping, summaries
 from gateway.recording.care.keeping import (
     choose_prunable,
@@ -22,9 +22,6 @@ from gateway.recording.care.keeping import (
 )
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.tables.column_names import DERIVED, PULLING
-from gateway.watch.reference_recording import why_no_reference
-from tests.disk.failing_disks import FailingDisk
-from tests.disk.watched_disk import watching
 
 NOW_S = 1_700_000_000.0
 COLUMNS = ("time_s", "force_n", "setpoint_n", "applied_n", "model_residual_n", "fault_code")
@@ -248,41 +245,6 @@ def test_one_recording_that_the_disk_does_not_let_go_keeps_no_other_one(
     assert ([int(one.path.stem) for one in gone], numbers(tmp_path)) == ([2, 3], [1])
     with pytest.raises(PermissionError):
         prune_recordings(tmp_path, Retention(days=10.0), "")
-
-
-def test_one_that_is_kept_or_deleted_while_it_is_deleted_stays_or_is_not_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Who is the first at the folder's lock is the first."""
-    whole = keeping.lock_directory
-    acts = [keep_recording, Path.unlink]
-
-    def lock_late(folder: Path) -> Any:
-        monkeypatch.setattr(keeping, "lock_directory", whole)
-        acts.pop(0)(path)
-        return whole(folder)
-
-    path = record(tmp_path)
-    monkeypatch.setattr(keeping, "lock_directory", lock_late)
-    assert delete_recording(path, "") == "it is kept" and path.exists()
-    let_recording_go(path)
-    monkeypatch.setattr(keeping, "lock_directory", lock_late)
-    with pytest.raises(FileNotFoundError):
-        delete_recording(path, "")
-
-
-def test_two_that_delete_the_only_one_meet_no_error_of_ours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = record(tmp_path)
-    monkeypatch.setattr(keeping, "why_protected", lambda one, reference: one.unlink() or "")
-    with pytest.raises(FileNotFoundError):
-        delete_recording(path, "")
-
-
-def test_what_the_disk_does_not_give_is_told_in_words(tmp_path: Path) -> None:
-    path = record(tmp_path)
-    with watching(FailingDisk(tmp_path, "broken", 2)):
-        faults = {read_entry(path).fault, summaries.summary_of(path)["fault"], why_no_reference(path)}
-    assert faults == {f"{path}: Input/output error: the disk is broken, or gone (dmesg)"}
 
 
 def test_a_cache_of_another_format_is_not_believed(tmp_path: Path) -> None:

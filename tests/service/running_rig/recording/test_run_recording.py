@@ -1,7 +1,6 @@
 """A recording beside the loop: whatever the disk does, the loop goes on, and no row that it can still take is lost."""
 
 import asyncio
-import contextlib
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -13,8 +12,7 @@ from gateway.codes.faults import FaultCode
 from gateway.control import CalibrationInUse, Controller
 from gateway.devices.messages import ForceSample, Quality
 from gateway.processes.disk_worker import DiskWorker
-from gateway.recording import Recorder, list_recordings, read_recording, recording_paths
-from gateway.recording.care.keeping import delete_recording
+from gateway.recording import Recorder, list_recordings, read_recording
 from gateway.recording.label import RecordingLabel
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
@@ -23,9 +21,7 @@ from gateway.service.running_rig.recording.run_recording import HANGS_S, RunReco
 from gateway.service.running_rig.recording.wanted_recording import WantedRecording
 from tests.control.bench import bsfm
 from tests.disk.at_once import AtOnce
-from tests.disk.failing_disks import FailingDisk
 from tests.disk.threads import join_disk_threads
-from tests.disk.watched_disk import watching
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
 
@@ -116,61 +112,6 @@ def test_a_disk_that_hangs_ends_the_recording_and_it_goes_on_in_another_when_the
     first, second = list_recordings(tmp_path)
     assert (first.fault, second.fault) == ("", "")
     assert second.rows > 200
-
-
-def test_a_recording_whose_file_a_disk_that_hung_never_made_is_refused_and_begins_by_itself_no_more(
-    recordings: Recordings, disk: HangingDisk, log: Log
-) -> None:
-    """It was said to record to `None`, and to go on for ever."""
-    begun = recordings.start()
-    rows_until(recordings, HANGS_S + 1.0)
-    disk.let_go()
-    assert "the disk has taken nothing for 30 s" in str(begun.exception())
-    rows_until(recordings, 3 * HANGS_S, HANGS_S + 1.1)
-    disk.let_go()
-    assert recordings.status() == {"recording": None}
-    assert [line for line in log if "None" in line or "recording  " in line] == []
-
-
-def test_one_that_goes_on_in_another_file_which_a_disk_that_hangs_never_makes_waits_for_it(
-    recordings: Recordings, disk: HangingDisk, log: Log
-) -> None:
-    recordings.start()
-    disk.let_go()
-    rows_until(recordings, 1.0)
-    disk.let_go()
-    recordings.use_plant(demo())
-    rows_until(recordings, HANGS_S + 2.0, 1.1)
-    disk.let_go()
-    assert "taken nothing" in recordings.status()["waits"]
-    rows_until(recordings, 2 * HANGS_S + 3.0, HANGS_S + 2.1)
-    disk.let_go()
-    assert recordings.status()["recording"]
-    recordings.stop()
-    disk.let_go()
-    assert [line for line in log if "None" in line] == []
-
-
-def test_one_that_ends_by_its_time_before_it_has_a_file_is_told_so(
-    recordings: Recordings, disk: HangingDisk, log: Log
-) -> None:
-    recordings.start(for_s=5.0)
-    rows_until(recordings, HANGS_S + 7.0)
-    disk.let_go()
-    assert [line for line in log if "ends after 5 s, 0 rows" in line and "None" not in line]
-
-
-def test_an_empty_recording_that_the_disk_has_ended_leaves_its_number_used(tmp_path: Path, log: Log) -> None:
-    """The one before it was deleted without a mark, for it was not the highest."""
-    recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]
-    recordings.start(), recordings.stop(), recordings.start()
-    first, second = recording_paths(tmp_path)
-    assert delete_recording(first, "") == ""
-    with watching(FailingDisk(tmp_path, "full", 1)):
-        rows_until(recordings, 1.0)
-    assert not second.exists()
-    with contextlib.closing(Recorder(tmp_path / "recordings", {}, ("time_s",))) as following:
-        assert following.number == 3
 
 
 def test_rows_are_handed_over_each_tenth_of_a_second(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
