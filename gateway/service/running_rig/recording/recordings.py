@@ -78,8 +78,8 @@ class Recordings:
             if error:
                 if not waits_for_room:  # another one may: it is still the one that it was
                     self._wanted = before
-                    if not has_waited:  # what was refused does not begin by itself
-                        self._again.forget()
+                    if not has_waited:  # what was refused does not begin by itself, nor in the next process
+                        self._want_no_more()
                 answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()

@@ -46,6 +46,18 @@ def test_a_recording_whose_file_a_disk_that_hung_never_made_is_refused_and_begin
     assert [line for line in log if "None" in line or "recording  " in line] == []
 
 
+def test_one_that_was_refused_behind_its_first_tick_does_not_begin_in_the_next_process(
+    recordings: Recordings, disk: HangingDisk, tmp_path: Path
+) -> None:
+    wanted: list[object] = []
+    recordings.on_wanted = wanted.append
+    begun = recordings.start(for_s=60.0)
+    rows_until(recordings, 1.0)
+    with watching(FailingDisk(tmp_path, "full", 1)):
+        disk.let_go()
+    assert begun.exception() and wanted[-1] is None
+
+
 def test_one_that_goes_on_in_another_file_which_a_disk_that_hangs_never_makes_waits_for_it(
     recordings: Recordings, disk: HangingDisk, log: Log
 ) -> None:
