@@ -46,14 +46,17 @@ class RecordingPlayer(Player):
         self.number = 0
         self.told: dict[str, int] = {}
         self.durable: dict[str, int] = {}
-        self.known_numbers: set[int] = set()
         self.recordings: Recordings | None = None
         self.is_wanted = False
-        self.deleted: set[str] = set()
+        self.deleted, self.used = set[str](), set[str]()  # used: that had been synced before
 
     def begin(self) -> None:
         self.recordings = Recordings(self.path("recordings"), self.rig, self.scene.say)
-        self.is_wanted = False
+        self.recordings.on_wanted = self._note_wanted
+        self.is_wanted, self.goes_on = False, False
+
+    def _note_wanted(self, wanted: object) -> None:
+        self.goes_on = wanted is not None
 
     def tick(self) -> None:
         if not self.recordings:
@@ -92,14 +95,14 @@ class RecordingPlayer(Player):
             self.told[name] = facts["rows"]
 
     def note_synced(self, path: Path) -> None:
-        """A file and its names were synced: what is in it outlives a power cut."""
+        """A file and its names were synced."""
+        if path.name in self.used and not self.is_touched:
+            self.complain(f"{path.name} was deleted, and its number is given again")
         with self.disk.aside():
             try:
                 self.durable[path.name] = read_recording(path).rows
             except (OSError, RecordingError):
                 return
-
-    # -- what is done
 
     def act(self) -> None:
         """The gateway is asked for one, or for its end."""
@@ -159,7 +162,6 @@ class RecordingPlayer(Player):
 
     def _delete(self) -> None:
         path = self._any()
-        number = int(path.stem)
         is_open = self._is_open(path)
         reference = self.scene.reference
         told, durable = (
@@ -179,8 +181,8 @@ class RecordingPlayer(Player):
                 or (path.name in self.scene.kept and not self.is_touched)
             ):
                 self.complain(f"{path.name} was deleted, and had to stay")
-            self.known_numbers.add(number)
             self.deleted.add(path.name)
+            self.used |= {path.name} if durable is not None else set()
             self._forget(path.name)
             if self._is_there(path):
                 self.complain(f"{path.name} is said to be deleted, and is there")
@@ -218,6 +220,7 @@ class RecordingPlayer(Player):
         finally:
             after = self._sizes()
             gone = {name for name in before if name not in after}
+            self.used |= gone & set(self.durable)
             for name in gone:
                 self._forget(name)
             must_stay |= {name for name in open_before if self._is_open(self.path("recordings", name))}
@@ -235,8 +238,6 @@ class RecordingPlayer(Player):
     def _sizes(self) -> dict[str, tuple[int, float]]:
         with self.disk.aside():
             return {path.name: (path.stat().st_size, path.stat().st_mtime) for path in self._paths()}
-
-    # -- ends
 
     def die(self) -> None:
         if self.recordings:
@@ -277,6 +278,8 @@ class RecordingPlayer(Player):
         assert self.recordings
         if self.is_wanted and not self.recordings._wanted.for_s and not self.recordings.status().get("recording"):
             self.complain(f"it does not go on on a disk that is well: {self.recordings.status()}")
+        if self.goes_on and not self.is_wanted:
+            self.complain("it was ended, and would go on in the next process")
         if not self.recordings.status().get("recording"):
             self._await("start", self.recordings.start())
             self.scene.go_on_all()
@@ -290,8 +293,6 @@ class RecordingPlayer(Player):
             self.complain(f"no recording on a disk that is well: {facts}")
             return
         name = Path(facts["written"]).name
-        if int(Path(name).stem) in self.known_numbers and not self.is_touched:
-            self.complain(f"{name} was deleted, and its number is given again")
         self.told[name] = facts["rows"]
         if not self.is_touched and self.durable.get(name, -1) != facts["rows"]:
             self.complain(f"{name} was ended with {facts['rows']} rows, {self.durable.get(name)} were synced")

@@ -36,6 +36,7 @@ class StorePlayer(Player):
         self.seen: set[int] = set()
         self.mark = 0
         self.changes = 0
+        self.unsynced: set[InUse] = set()
 
     def store(self) -> NumberedStore[Any]:
         """As each process opens it."""
@@ -86,9 +87,12 @@ class StorePlayer(Player):
             self._refused(f"use {number}", refusal)
             if number in self.documents and str(refusal).startswith("E433") and not self.is_touched:
                 self.complain(f"{number} was stored, and is not known: {refusal}")
+            if any(call.what == "fsync" for call in self.disk.refused):
+                self.unsynced |= self.possible  # neither the name is on the disk for certain, nor its removal
             if not self._may_stand() and count == self.changes:
                 self.possible = before
             return
+        self.unsynced = set()
         self.scene.note(f"in use {self.folders[0]} {number}")
         earlier = before if count == self.changes else self.possible
         self.possible = {one.after(number) for one in earlier}
@@ -112,7 +116,7 @@ class StorePlayer(Player):
         selected = store.find_selected()
         for note in selected.notes:
             self.judge_words(note)
-            if "E432" not in note:
+            if not note.startswith("E4"):
                 self.complain(f"a note without its code: {note}")
         try:
             store.list()
@@ -133,6 +137,9 @@ class StorePlayer(Player):
     def _may_stand(self) -> bool:
         """A name stands whose fsync was refused and whose removal was, too: the one thing that cannot be taken back."""
         return [call.what for call in self.disk.refused].count("unlink") > 0 or len(self.disk.refused) > 1
+
+    def lose_power(self) -> None:
+        self.possible |= self.unsynced
 
     # -- what is asked
 
