@@ -33,6 +33,7 @@ LONGEST_BYTES: Final = 8 << 20
 KEPT: Final = 32
 """Files, the one that is written among them: 256 MiB, years of a cell's edges and of summaries of its setpoints."""
 BROKEN: Final = "chain broken"
+_NO_HEAD: Final = (errno.ENOENT, errno.ENOTDIR, errno.EFBIG)
 Fields = Mapping[str, Any]
 
 
@@ -46,12 +47,18 @@ def audit_files(folder: Path) -> list[Path]:
 
 
 def read_head(folder: Path) -> ChainEnd | None:
-    """Return what the head says; None where there is none that can be read."""
+    """Return what the head says; None where there is none that says anything. OSError where the disk does not give it now: it
+    may be whole."""
+    path = folder / HEAD
     try:
-        fields = read_object(folder / HEAD)
+        fields = {} if other_kind(path) else read_object(path)
         return ChainEnd(int(fields["n"]), str(fields["sha256"]))
-    except (OSError, ValueError, KeyError, TypeError, OverflowError):
-        return None
+    except OSError as error:
+        if error.errno not in _NO_HEAD:
+            raise
+    except (ValueError, KeyError, TypeError, OverflowError):
+        pass
+    return None
 
 
 def first_number(path: Path) -> int:
@@ -164,7 +171,7 @@ class AuditFile:
     def _start(self) -> None:
         """Continue the chain that is there: what is torn goes, and a line tells of it, and of what is broken."""
         make_directory(self._folder)
-        files, head = audit_files(self._folder), self._head_of_before()
+        files, head = audit_files(self._folder), read_head(self._folder)
         end, found = ChainEnd(first_number(files[-1]) - 1 if files else 0), list[Fields]()
         if files:
             end, found = self._continue(files[-1], end, head)
@@ -180,13 +187,6 @@ class AuditFile:
         self._is_open = True
         self._untold += found
         self._found = tuple(str(each["text"]) for each in found if each["what"] == BROKEN)
-
-    def _head_of_before(self) -> ChainEnd | None:
-        """Return the head. OSError where the disk does not give it now: it may be whole, and is asked again."""
-        with contextlib.suppress(FileNotFoundError):
-            if not other_kind(self._head):
-                os.close(open_plain(self._head))
-        return read_head(self._folder)
 
     def _doubt(self, head: ChainEnd | None, files: list[Path], end: ChainEnd) -> str:
         """Return what the head does not find; empty where the files hold what it names, and perhaps more. The next batch

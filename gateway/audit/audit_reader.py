@@ -3,6 +3,7 @@
 A gateway may be writing meanwhile: a last line without its newline is no fault, and lines beyond the head are those since.
 """
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,21 +35,23 @@ def read_audit(state: Path, on_left_out: Callable[[], None] = lambda: None) -> I
     """Yield what the lines say, oldest first, whether or not the chain holds; what is no line is passed over. on_left_out:
     called at each whole line that is none of ours, such as one that was changed."""
     for path in audit_files(state / AUDIT):
-        for line in iterate_lines(path):
-            try:
-                fields, _ = open_line(line.text)
-            except BrokenLine:
-                if line.is_whole:
-                    on_left_out()
-                continue
-            yield fields
+        with contextlib.suppress(FileNotFoundError):  # the oldest may go meanwhile
+            for line in iterate_lines(path):
+                try:
+                    fields, _ = open_line(line.text)
+                except BrokenLine:
+                    if line.is_whole:
+                        on_left_out()
+                    continue
+                yield fields
 
 
 def verify_audit(state: Path) -> AuditVerdict:
-    """Follow the chain to its first break. FileNotFoundError where there is no audit."""
+    """Follow the chain to its first break. FileNotFoundError where there is no audit, OSError where it cannot be read."""
     folder = state / AUDIT
-    head = read_head(folder)  # before the files, which may grow meanwhile
-    files = audit_files(folder)
+    head, files = read_head(folder), audit_files(folder)  # in this order: the files may grow meanwhile
+    if files and head is None:  # it may begin just now
+        head, files = read_head(folder), audit_files(folder)
     if not files and head is None:
         raise FileNotFoundError(folder)
     walk = _ChainWalk(head)
@@ -56,6 +59,9 @@ def verify_audit(state: Path) -> AuditVerdict:
         for path in files:
             try:
                 walk.read(path, is_last=path == files[-1])
+            except FileNotFoundError:
+                if walk.count:
+                    raise BrokenLine("is gone, or leads nowhere") from None  # else the oldest, which may go meanwhile
             except BrokenLine as broken:
                 if not walk.may_be_unsynced or path != files[-1]:
                     raise
@@ -110,7 +116,7 @@ class _ChainWalk:
         self.file, self.line = HEAD, 0
         if self._head is None:
             raise BrokenLine("is missing or damaged: lines at the end may have been removed")
-        if not self._is_head_met:
+        if not self._is_head_met and self._head.number > begin.number:  # else its line was dropped meanwhile
             raise BrokenLine(
                 f"names line {self._head.number}, the last that is there is {self.end.number}: the end was removed"
             )

@@ -24,6 +24,7 @@ from gateway.calibrations.activation import Activation, ActiveCalibration, Unusa
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.numbered_documents.store import SelectedDocument, StoreError
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes.disk_worker import DiskWorker, Done, Work
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
@@ -210,7 +211,10 @@ class UploadService:
             sentence = f"{error}; active set {active} unchanged"
             reason = int(UploadReason.STORAGE if error.code == _NO_ROOM else UploadReason.NOT_STORED)
         elif isinstance(error, OSError):
-            sentence, reason = f"{_NO_ROOM} {error.strerror}; active set {active} unchanged", int(UploadReason.STORAGE)
+            sentence, reason = (
+                f"{_NO_ROOM} {tell_place_and_refusal(error)}; active set {active} unchanged",
+                int(UploadReason.STORAGE),
+            )
         else:
             trace = "".join(traceback.format_exception(error))
             sentence = f"A499 internal error, please report it; active set {active} unchanged:\n{trace}"

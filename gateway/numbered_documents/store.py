@@ -186,9 +186,7 @@ class NumberedStore(ABC, Generic[Document]):
             return SelectionState(), ()
         except OSError as error:
             if is_to_change:
-                raise StoreError(
-                    "E432", f"{error.filename or self.directory} cannot be read: {error.strerror}"
-                ) from None
+                raise self._unread_error(error) from None
             return SelectionState(), (
                 f"E432 {self.directory} cannot be read: {error.strerror}; built-in {self.noun} used",
             )
@@ -203,7 +201,10 @@ class NumberedStore(ABC, Generic[Document]):
         if self.built_in is not None and self.number_of(self.built_in) == number:
             return self.built_in
         own = [] if self.built_in is None else [self.number_of(self.built_in)]
-        known = ", ".join(map(str, sorted({*own, *self.numbers()}))) or "none yet"
+        try:
+            known = ", ".join(map(str, sorted({*own, *self.numbers()}))) or "none yet"
+        except OSError as error:
+            raise self._unread_error(error) from None
         raise StoreError("E433", f"there is no {self.noun} {number} in {self.directory}; there are: {known}")
 
     def numbers(self) -> Numbers:
@@ -219,6 +220,10 @@ class NumberedStore(ABC, Generic[Document]):
                 "E431", f"{self.directory} holds {self.noun} {_LAST}, the last number: start a new --state"
             )
         return number
+
+    def _unread_error(self, error: OSError) -> StoreError:
+        place = error.filename or self.directory
+        return StoreError("E432", f"{place} cannot be read: {error.strerror}", is_unread=True)
 
     def _disk_error(self, error: OSError) -> StoreError:
         return StoreError("E431", f"{self.noun} not stored: {tell_place_and_refusal(error)}")

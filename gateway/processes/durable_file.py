@@ -62,11 +62,13 @@ def _lock(descriptor: int, directory: Path, *, shared: bool) -> None:
 
 
 def make_directory(directory: Path) -> None:
-    """Make the directory, durably; do nothing when it is there. OSError, and it is not there, when that fails."""
+    """Make the directory, durably. OSError, and it is not there unless it was before, when that fails. The name of one that is
+    there may not be on the disk yet: who made it was killed, or is at it now."""
     directory.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     try:
         directory.mkdir(mode=0o700)
     except FileExistsError:
+        sync_path(directory.parent)
         return
     try:
         _make_owner_s(directory)
@@ -211,6 +213,7 @@ def _write(directory: int, name: str, data: bytes) -> None:
 
 
 def sync_path(path: Path) -> None:
-    """Have a file's data, or a directory's names, put on the disk. OSError where it refuses."""
-    with closing_descriptor(os.open(path, os.O_RDONLY | os.O_CLOEXEC)) as descriptor:
+    """Have a file's data, or a directory's names, put on the disk. OSError where it refuses; a pipe in its place is not waited
+    for."""
+    with closing_descriptor(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)) as descriptor:
         os.fsync(descriptor)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
 from gateway.processes.state_directory import RECORDINGS
-from gateway.recording.errors import RecordingError
+from gateway.recording.errors import RecordingError, tell_unreadable
 from gateway.recording.layout import HEADER_PREFIX, LONGEST_HEADER, MAGIC, MARK, SUFFIX, Batch, batch_at, number_in
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def read_entry(path: Path) -> RecordingEntry:
     except FileNotFoundError:
         raise
     except (RecordingError, OSError) as error:
-        return RecordingEntry(number, path, {}, 0, 0.0, size_bytes, True, str(error))
+        return RecordingEntry(number, path, {}, 0, 0.0, size_bytes, True, tell_unreadable(error))
     row_size = len(header["columns"]) * _ROW_ITEM
     batches, notes = _all_batches(data, offset, row_size)
     rows = sum(batch.rows for batch in batches)

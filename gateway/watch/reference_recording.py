@@ -6,7 +6,7 @@ said that the machine is as it should be. What a user has chosen stays until he 
 """
 
 import json
-import shutil
+import os
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from hashlib import sha256
@@ -15,21 +15,21 @@ from typing import Final
 
 from gateway.numbered_documents.selection import read_selection
 from gateway.processes.durable_file import (
-    give_to_owner,
     lock_directory,
     make_directory,
     read_object,
     remove_if_possible,
     replace_durably,
-    sync_path,
 )
 from gateway.processes.state_directory import CALIBRATIONS
 from gateway.recording import RecordingError, read_header, read_table
 from gateway.recording.care.keeping import CLOSED_S
+from gateway.recording.errors import tell_unreadable
 from gateway.recording.reader import Recording, recording_paths
 
 _FOLDER: Final = "reference"
 _FACTS: Final = "reference.json"
+_DIGITS: Final = 12
 _LEAST_S: Final = 30.0
 LEAST_EXCITATION_V: Final = 0.2
 LEAST_MOVES: Final = 4
@@ -38,8 +38,8 @@ LEAST_MOVES: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class ReferenceRecording:
-    """file: the copy's name in STATE/reference; name: of the recording; calibration: the number that was in use then, 0 for one
-    that a user has chosen (is_chosen)."""
+    """file: the copy's name in STATE/reference, another one for other content; name: of the recording; calibration: the number
+    that was in use then, 0 for one that a user has chosen (is_chosen)."""
 
     file: str
     name: str
@@ -67,10 +67,11 @@ def read_reference_recording(state: Path) -> ReferenceRecording | None:
 def keep_reference_recording(state: Path, recording: Path, calibration: int | None = None) -> ReferenceRecording:
     """Keep a copy of this recording as the rig's reference, and return what is known of it. calibration: that it was found
     for; None: a user has chosen it. OSError, and the one before stays, where it cannot be read or the disk refuses."""
-    folder, digest = state / _FOLDER, sha256(recording.read_bytes()).hexdigest()
+    folder, data = state / _FOLDER, recording.read_bytes()
+    digest = sha256(data).hexdigest()
     make_directory(folder)
     kept = ReferenceRecording(
-        file=recording.name,
+        file=f"{recording.stem}-{digest[:_DIGITS]}{recording.suffix}",
         name=recording.name,
         sha256=digest,
         kept_utc=f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
@@ -78,17 +79,11 @@ def keep_reference_recording(state: Path, recording: Path, calibration: int | No
         is_chosen=calibration is None,
     )
     with lock_directory(folder) as descriptor:
-        beside = folder / f".{kept.file}"
         try:
-            shutil.copyfile(recording, beside)
-            with beside.open("rb") as made:
-                give_to_owner(made.fileno(), beside.name, descriptor)
-            sync_path(beside)
-            beside.replace(folder / kept.file)
-            sync_path(folder)
-        finally:
-            beside.unlink(missing_ok=True)
-        replace_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
+            replace_durably(descriptor, kept.file, data)
+            replace_durably(descriptor, _FACTS, json.dumps(asdict(kept)).encode())
+        except OSError as error:  # of the descriptor it knows the name alone
+            raise OSError(error.errno, error.strerror, str(folder)) from None
         _remove_all_but(folder, descriptor, kept.file)
     return kept
 
@@ -100,6 +95,7 @@ def drop_reference_recording(state: Path) -> bool:
         return False
     with lock_directory(folder) as descriptor:
         (folder / _FACTS).unlink(missing_ok=True)
+        os.fsync(descriptor)
         _remove_all_but(folder, descriptor, "")
     return True
 
@@ -152,7 +148,7 @@ def why_no_reference(path: Path) -> str:
     try:
         recording = read_table(path)
     except (OSError, RecordingError) as error:
-        return str(error)
+        return tell_unreadable(error)
     return _why_it_says_little(recording)
 
 

@@ -10,11 +10,13 @@ from click.testing import CliRunner
 
 from gateway.audit import audit_reader
 from gateway.audit.audit_file import AuditFile
-from gateway.audit.audit_reader import verify_audit
+from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.audit.chain import open_line, seal_line
 from gateway.cli.main import command
 from tests.audit.appending import append
 from tests.audit.test_chain import FILE_BYTES, LINES, files_of, records
+from tests.disk.failing_disks import FailingDisk
+from tests.disk.watched_disk import watching
 
 
 def test_a_piece_of_a_line_is_a_note_at_the_end_of_the_last_file_only(state: Path) -> None:
@@ -43,6 +45,59 @@ def test_an_audit_that_grows_while_it_is_verified_holds(state: Path, monkeypatch
     monkeypatch.setattr(audit_reader, "audit_files", list_late)
     assert verify_audit(state).broken is None
     file.close()
+
+
+def test_an_audit_that_begins_while_it_is_verified_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its head was looked for before it was there, its lines afterwards."""
+    file, looking = AuditFile(tmp_path, FILE_BYTES), audit_reader.read_head
+
+    def look_early(folder: Path) -> object:
+        found = looking(folder)
+        append(file, records(1))
+        return found
+
+    monkeypatch.setattr(audit_reader, "read_head", look_early)
+    assert verify_audit(tmp_path).broken is None
+    file.close()
+
+
+def test_an_audit_whose_head_has_named_a_line_of_a_file_that_went_meanwhile_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, looking = AuditFile(tmp_path, 500, 2), audit_reader.read_head
+
+    def look_early(folder: Path) -> object:
+        found = looking(folder)
+        for record in records(12):
+            append(file, [record])
+        return found
+
+    append(file, records(1))
+    monkeypatch.setattr(audit_reader, "read_head", look_early)
+    assert verify_audit(tmp_path).broken is None
+    file.close()
+
+
+def test_the_oldest_file_may_go_while_an_audit_is_read_and_no_other_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = AuditFile(tmp_path, 500, 2)
+    for record in records(12):
+        append(file, [record])
+    file.close()
+    first, *rest = files_of(tmp_path)
+    before, behind = first.with_name("000000000001.jsonl"), first.with_name("000000000099.jsonl")
+    monkeypatch.setattr(audit_reader, "audit_files", lambda folder: [before, first, *rest])
+    assert verify_audit(tmp_path).broken is None
+    assert [record["old"] for record in read_audit(tmp_path) if "old" in record][-1] == 12
+    monkeypatch.setattr(audit_reader, "audit_files", lambda folder: [first, *rest, behind])
+    broken = verify_audit(tmp_path).broken
+    assert broken and (broken.file, broken.text) == (behind.name, "is gone, or leads nowhere")
+
+
+def test_a_head_that_the_disk_does_not_give_is_not_called_removed(state: Path) -> None:
+    with watching(FailingDisk(state, "once", 1)), pytest.raises(OSError, match="Input/output error"):
+        verify_audit(state)
 
 
 @pytest.mark.parametrize("away", [1, -1])

@@ -217,6 +217,7 @@ def test_stored_means_written_renamed_and_both_synced_in_this_order(used):
     wanted = ("open", "write", "fsync", "rename")
     expected = []
     for name in ("0004.yaml.new", "active.000003.new"):
+        expected += [("open", "state"), ("fsync", "state")]
         expected += [("open", "calibrations"), ("open", name), ("write", name), ("fsync", name), ("rename", name)]
         expected.append(("fsync", "calibrations"))
     assert [call for call in there.calls if call[0] in wanted] == expected
@@ -248,6 +249,13 @@ def test_a_directory_that_may_not_be_read_is_said(used, monkeypatch):
         selected = used.find_selected()
     assert selected.document == OWN
     assert "cannot be read: Permission denied" in selected.notes[0]
+
+
+def test_one_that_is_looked_for_in_a_folder_that_may_not_be_read_is_refused_by_a_sentence(used, monkeypatch):
+    """And not called unknown."""
+    monkeypatch.setattr(Path, "iterdir", lambda path: os.scandir(os.devnull + "/"))
+    with pytest.raises(StoreError, match=r"E432 .* cannot be read: Not a directory"):
+        used.use(77)
 
 
 # -- beside others

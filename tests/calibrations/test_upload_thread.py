@@ -82,6 +82,14 @@ def test_an_upload_that_no_thread_can_be_had_for_fails_and_the_next_one_does_not
     asyncio.run(main())
 
 
+def test_what_the_disk_does_not_give_is_told_with_its_place(bench: Bench):
+    bench.upload.run_in_background = lambda work, done: done(
+        PermissionError(13, "Permission denied", "/cell/calibrations")
+    )
+    bench.upload.use(2)
+    assert bench.upload.status()["said"].startswith("E431 /cell/calibrations: Permission denied; active set")
+
+
 def test_a_loop_that_ends_before_the_disk_is_ready_leaves_the_old_set_or_the_new_one(bench: Bench):
     go = threading.Event()
 

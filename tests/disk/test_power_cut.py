@@ -6,6 +6,8 @@ from random import Random
 
 import pytest
 
+from gateway.calibrations.store import CalibrationStore
+from tests.calibrations.coefficients import calibration
 from tests.disk.acts.acts import Act, AuditedWrites
 from tests.disk.acts.all_acts import SYNCED
 from tests.disk.power_cut import JournaledDisk
@@ -54,6 +56,18 @@ def test_after_a_power_cut_it_is_the_old_or_the_new_and_what_was_said_stays(
                     raise AssertionError(f"cut behind change {cut} ({place}), {mode}, {said} were told") from error
     print(f"{count} states after cuts behind {len(disk.changes)} changes")
     assert count >= len(cuts)
+
+
+def test_what_is_stored_in_a_folder_whose_maker_was_killed_outlives_a_power_cut(fast_folder: Path) -> None:
+    """Nobody has synced the folder's own name."""
+    (state := fast_folder / "state").mkdir()
+    disk = JournaledDisk(state)
+    with watching(disk):
+        (state / "calibrations").mkdir()
+        number = CalibrationStore(state).add(calibration(1))
+    for mode, tree in disk.states(len(disk.changes), 0):
+        tree.write_to(fast_folder / mode)
+        assert CalibrationStore(fast_folder / mode).numbers() == [number]
 
 
 class FirstAuditedWrite(AuditedWrites):

@@ -8,7 +8,16 @@ from pathlib import Path
 import pytest
 
 from gateway.processes import durable_file
-from gateway.processes.durable_file import give_all_to_owner, lock_directory, make_directory, read_object, write_durably
+from gateway.processes.durable_file import (
+    give_all_to_owner,
+    lock_directory,
+    make_directory,
+    read_object,
+    sync_path,
+    write_durably,
+)
+from gateway.recording.care.keeping import is_being_recorded
+from tests.other_kinds import never_waiting, put
 
 
 def mode_of(path: Path) -> int:
@@ -184,3 +193,12 @@ def test_all_that_root_has_left_in_a_folder_of_somebody_is_theirs_and_nothing_el
     give_all_to_owner(state / "of another rig")
     assert (state / "of another rig").stat().st_uid == 501
     give_all_to_owner(tmp_path / "none" / "none")
+
+
+def test_a_pipe_in_place_of_what_is_synced_or_asked_is_not_waited_for(tmp_path: Path) -> None:
+    """The thread that syncs would have hung with it, and the gateway's end."""
+    pipe = put("a pipe", tmp_path / "0001.fgr")
+    with never_waiting():
+        with pytest.raises(OSError, match="Invalid argument"):
+            sync_path(pipe)
+        assert not is_being_recorded(pipe)

@@ -223,10 +223,9 @@ def test_the_copy_is_on_the_disk_before_anything_says_that_it_is_the_reference(
     """A power cut between the two would else take the new one and the one before."""
     recording, done = tmp_path / "0007.fgr", list[str]()
     recording.write_bytes(b"rows")
-    monkeypatch.setattr(reference_recording, "sync_path", lambda path: done.append(path.name))
     monkeypatch.setattr(reference_recording, "replace_durably", lambda descriptor, name, data: done.append(name))
-    keep_reference_recording(tmp_path, recording)
-    assert done == [".0007.fgr", "reference", "reference.json"]
+    kept = keep_reference_recording(tmp_path, recording)
+    assert done == [kept.file, "reference.json"] and kept.name == "0007.fgr"
 
 
 def test_a_rig_that_has_gone_back_to_its_own_calibration_finds_no_reference(tmp_path: Path) -> None:

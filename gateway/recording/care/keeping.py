@@ -49,7 +49,7 @@ def is_kept(path: Path) -> bool:
 
 def is_being_recorded(path: Path) -> bool:
     """Decide whether somebody holds the lock of this recording. FileNotFoundError where there is none."""
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -135,10 +135,10 @@ def delete_recording(path: Path, reference: str) -> str:
     Its number is marked first where it is the highest, for that one would be given again. The mark of any other one is not
     needed, and so what is deleted on a full disk needs no room.
     """
-    if why := why_protected(path, reference):
-        return why
     with lock_directory(path.parent) as descriptor:
-        is_highest = not _has_next(path) and int(path.stem) == max(_numbers(path.parent))
+        if why := why_protected(path, reference):  # in the lock: it may have been kept a moment ago
+            return why
+        is_highest = not _has_next(path) and int(path.stem) == max(_numbers(path.parent), default=0)
         if is_highest:
             replace_durably(descriptor, path.with_suffix(_GONE).name, b"")
         path.unlink()
@@ -147,6 +147,16 @@ def delete_recording(path: Path, reference: str) -> str:
         if is_highest:
             _keep_highest_mark(path.parent, descriptor)
     return ""
+
+
+def drop_empty_recording(path: Path) -> None:
+    """Remove a recording without a row, that a full disk has ended, say. OSError where the disk refuses.
+
+    Its name becomes the mark of its number, which needs no room: those before may have been deleted without one.
+    """
+    path.rename(path.with_suffix(_GONE))
+    with lock_directory(path.parent) as descriptor:
+        _keep_highest_mark(path.parent, descriptor)
 
 
 def _has_next(path: Path) -> bool:

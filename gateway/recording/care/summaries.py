@@ -19,7 +19,7 @@ from gateway.processes.state_directory import RECORDINGS
 from gateway.progress import report
 from gateway.recording.care.keeping import is_being_recorded
 from gateway.recording.care.what_happened import tell_happened
-from gateway.recording.errors import RecordingError
+from gateway.recording.errors import RecordingError, tell_unreadable
 from gateway.recording.label import label_of
 from gateway.recording.reader import Recording, read_header, read_recording, recording_paths
 
@@ -60,7 +60,7 @@ def summary_of(path: Path) -> Summary:
     except FileNotFoundError:
         raise
     except (RecordingError, OSError) as error:
-        return _NOTHING_KNOWN | summary | {"fault": str(error)}
+        return _NOTHING_KNOWN | summary | {"fault": tell_unreadable(error)}
     happened = tell_happened(recording)
     return {
         **summary,
@@ -88,7 +88,7 @@ def _summary_of_growing(path: Path) -> Summary:
     except FileNotFoundError:
         raise
     except (RecordingError, OSError) as error:
-        said = {"fault": str(error)}
+        said = {"fault": tell_unreadable(error)}
     return _NOTHING_KNOWN | _of_file(path) | said
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.numbered_documents.store import StoreError
+from gateway.plain_file import tell_place_and_refusal
 from gateway.plants.in_use import with_plant_in_use
 from gateway.plants.store import PlantStore
 from gateway.processes.disk_worker import DiskWorker, Done, Work
@@ -102,7 +103,7 @@ class RigPlants:
         if isinstance(result, StoreError):
             self._outcome = f"{result}; {_plant(self.rig)} stays in use"
         elif isinstance(result, OSError):
-            self._outcome = f"E431 {result.strerror}; {_plant(self.rig)} stays in use"
+            self._outcome = f"E431 {tell_place_and_refusal(result)}; {_plant(self.rig)} stays in use"
         elif isinstance(result, Exception):
             self._outcome = f"A499 internal error, please report it: {result!r}; {_plant(self.rig)} stays in use"
         else:

@@ -87,7 +87,7 @@ DEFECTS = (
     Defect("the number of the last deleted recording is used again", "recording/care/keeping.py",
            "*lower, _ = sorted(marks)", "_, *lower = sorted(marks)", ("recording/care/test_care.py",)),
     Defect("to delete a recording needs room on the disk", "recording/care/keeping.py",
-           "int(path.stem) == max(_numbers(path.parent))", "True",
+           "int(path.stem) == max(_numbers(path.parent), default=0)", "True",
            ("recording/test_refusing_disks.py",)),
     Defect("of two limits of recordings their days alone count", "recording/care/keeping.py",
            "    if retention.bytes is not None and total_bytes > retention.bytes:",

@@ -52,7 +52,12 @@ def test_what_waits_for_the_end_of_a_force_is_taken_once_it_is_over_and_once(edg
 
 
 @pytest.mark.parametrize(
-    ("error", "words"), [(OSError(28, "No space left on device"), "E431 No space left"), (KeyError("x"), "A499")]
+    ("error", "words"),
+    [
+        (OSError(28, "No space left on device"), "E431 No space left"),
+        (OSError(13, "Permission denied", "/cell/plants"), "E431 /cell/plants: Permission denied"),
+        (KeyError("x"), "A499"),
+    ],
 )
 def test_a_change_that_came_to_nothing_is_told_as_failed_and_the_plant_stays(
     edges: Edges, error: Exception, words: str

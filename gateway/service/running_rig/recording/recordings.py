@@ -71,12 +71,15 @@ class Recordings:
 
     def _start(self, wanted: WantedRecording, *, waits_for_room: bool) -> Future[Answer]:
         before, self._wanted = self._wanted, wanted
+        has_waited = bool(self._again.why)
         answer: Future[Answer] = Future()
 
         def opened(fresh: RunRecording, error: OSError | None) -> None:
             if error:
                 if not waits_for_room:  # another one may: it is still the one that it was
                     self._wanted = before
+                    if not has_waited:  # what was refused does not begin by itself, nor in the next process
+                        self._want_no_more()
                 answer.set_exception(OSError(f"{self._directory}: {tell_refusal(error)}"))
             else:
                 self._again.forget()
@@ -224,7 +227,8 @@ class Recordings:
             self._try_again(now_s)
 
     def _tell_over(self, ended: RunRecording) -> None:
-        self._log("recording", f"{ended.path} ends after {self._wanted.for_s:g} s, {ended.rows_written} rows")
+        file = ended.path or "a recording whose file the disk has not made"
+        self._log("recording", f"{file} ends after {self._wanted.for_s:g} s, {ended.rows_written} rows")
 
     def _end_failed(self, recording: RunRecording, now_s: float) -> None:
         self._end(recording, lambda: None)

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from gateway.calibrations.kept_ladders import kept_ladders
 from gateway.live.standstill import suspended_s
+from gateway.plain_file import tell_place_and_refusal
 from gateway.processes.disk_worker import DiskWorker
 from gateway.processes.event_log import EventLog
 from gateway.profiles.recordings_section import Retention
@@ -82,7 +83,8 @@ class RecordingRetention:
 
     def _tell(self, gone: Any) -> None:
         if isinstance(gone, BaseException):
-            self._log("recording", f"recordings were not pruned: {gone}")
+            why = tell_place_and_refusal(gone) if isinstance(gone, OSError) else repr(gone)
+            self._log("recording", f"recordings were not pruned: {why}")
         elif gone:
             names, size_mb = few([one.path.name for one in gone]), sum(one.size_bytes for one in gone) / 1e6
             reasons = few([one.why for one in gone])

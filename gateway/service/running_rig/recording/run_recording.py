@@ -10,6 +10,7 @@ half a second after its recording had begun left not a row.
 """
 
 import contextlib
+import errno
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -20,12 +21,14 @@ from gateway.devices.messages import ForceSample
 from gateway.plain_file import tell_refusal
 from gateway.processes.disk_worker import DiskWorker
 from gateway.recording import Recorder
+from gateway.recording.care.keeping import drop_empty_recording
 from gateway.recording.recorder import sync_recording
 from gateway.service.running_rig.lines.output_line import LineState
 from gateway.service.running_rig.recording.recorded_row import row_of
 
 HANGS_S: Final = 30.0
 FLUSH_S: Final = 0.1
+_HANGS: Final = f"the disk has taken nothing for {HANGS_S:g} s"
 Log = Callable[[str, str], None]
 
 
@@ -82,8 +85,12 @@ class RunRecording:
     def failure(self) -> str | None:
         """Sentence that says why it stopped by itself; None while it records, and where no file was opened."""
         if self._is_hung:
-            stopped = f"stopped after {self.rows_written} rows: the disk has taken nothing for {HANGS_S:g} s"
-            return f"E402 recording {self.path or ''} {stopped}; control goes on"
+            begun = (
+                f"recording {self.path} stopped after {self.rows_written} rows"
+                if self.path
+                else "no recording was begun"
+            )
+            return f"E402 {begun}: {_HANGS}; control goes on"
         return self._file.failure if self._file else None
 
     def append(self, sample: ForceSample, decision: Output, line: LineState, *labels: float) -> None:
@@ -142,9 +149,10 @@ class RunRecording:
     # -- in the thread
 
     def _open(self) -> None:
-        if not self._is_hung:
-            self._file = self._make()
-            self._begin_sync(self._file.path)
+        if self._is_hung:
+            raise TimeoutError(errno.ETIMEDOUT, _HANGS)
+        self._file = self._make()
+        self._begin_sync(self._file.path)
 
     def _write(self, rows: list[tuple[float, ...]]) -> None:
         if self._file:
@@ -157,7 +165,7 @@ class RunRecording:
             self._file.close()
             if drops_empty and not self._file.rows_written:
                 with contextlib.suppress(OSError):
-                    self._file.path.unlink()
+                    drop_empty_recording(self._file.path)
             self._begin_sync(self._file.path)
 
     def _begin_sync(self, path: Path) -> None:

@@ -149,3 +149,11 @@ def test_the_ladder_of_the_calibration_in_use_stays_however_old_it_is(
     retention.close()
     assert [one.path for one in retention._prune(0.0)] == [paths[0], paths[2]]
     assert paths[1].is_file()
+
+
+def test_why_nothing_was_pruned_is_told_in_words(tmp_path: Path) -> None:
+    said = Said()
+    RecordingRetention(tmp_path, Retention(days=30.0), said)._tell(
+        PermissionError(13, "Permission denied", "/cell/0001.fgr")
+    )
+    assert said.lines == ["recordings were not pruned: /cell/0001.fgr: Permission denied"]

@@ -1,0 +1,39 @@
+"""What recordings must hold after what was told of them; and what a retention may take: what is too old, and as many bytes as
+there are too many."""
+
+from collections.abc import Iterator
+
+from gateway.profiles.recordings_section import Retention
+from gateway.recording import RecordingEntry, read_recording
+
+Sizes = dict[str, tuple[int, float]]
+"""Bytes and time of the end (s of the epoch), by the file's name."""
+
+
+def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str:
+    """Return what has gone and need not, in words; empty for nothing."""
+    gone = [name for name in before if name not in after]
+    not_old = [name for name in gone if limits.days is None or wall_s - before[name][1] <= limits.days * 86400.0]
+    total, most = sum(size for size, _ in after.values()), max((before[name][0] for name in not_old), default=0)
+    if not_old and (limits.bytes is None or total + most <= limits.bytes):
+        return f"{not_old} went, {total} bytes are left of {limits}"
+    return ""
+
+
+def broken_rows(entries: list[RecordingEntry], told: dict[str, int], durable: set[str], last: int) -> Iterator[str]:
+    """Say where what was told is not there, or something is there twice, out of order, or was never recorded.
+
+    told: rows by the file's name; durable: names of files that were synced; last: number of the last row.
+    """
+    rows_in = {entry.path.name: entry.rows for entry in entries if not entry.fault}
+    numbers: list[int] = []
+    for entry in entries:
+        if not entry.fault:
+            numbers += [int(one) for one in read_recording(entry.path).columns["force_n"]]
+        elif entry.path.name in durable:
+            yield entry.fault
+    if numbers != sorted(set(numbers)) or not set(numbers) <= set(range(last + 1)):
+        yield f"rows {numbers}, {last} were recorded"
+    for name, rows in told.items():
+        if rows_in.get(name, 0) < rows and (rows or name in durable):
+            yield f"{name}: {rows} rows were told, {rows_in.get(name)} are there"

@@ -1,0 +1,46 @@
+"""Thousands of drawn scenes of what is kept on disk: what was said to be stored is there, whatever befell disk and power.
+
+A scene is one seed: which stores there are, what is done with them, and what befalls them. The laws are the players' own.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from tests.disk.drawn.audit_player import AuditPlayer
+from tests.disk.drawn.player import Player
+from tests.disk.drawn.recording_player import RecordingPlayer
+from tests.disk.drawn.scene import Scene, clean
+from tests.disk.drawn.small_players import CounterPlayer, Onlooker, ReferencePlayer, Terminal
+from tests.disk.drawn.store_player import CalibrationPlayer, PlantPlayer
+
+EVERY: list[type[Player]] = [
+    AuditPlayer,
+    CalibrationPlayer,
+    PlantPlayer,
+    RecordingPlayer,
+    ReferencePlayer,
+    CounterPlayer,
+    Onlooker,
+]
+COUNTS: dict[str, tuple[list[type[Player]], int]] = {
+    "audit": ([AuditPlayer], 25),
+    "calibrations": ([CalibrationPlayer], 25),
+    "recordings": ([RecordingPlayer], 30),
+    "reference": ([ReferencePlayer], 25),
+    "all": (EVERY, 25),
+    "verbs": ([Terminal, Terminal, *EVERY], 6),
+}
+"""How many scenes of each in the push gate."""
+
+
+@pytest.mark.parametrize("which", COUNTS)
+def test_what_was_said_to_be_stored_is_there_and_all_heals_with_the_disk(
+    fast_folder: Path, which: str, budget: int
+) -> None:
+    kinds, count = COUNTS[which]
+    broken = []
+    for seed in range(count * budget):
+        broken += [(seed, words) for words in Scene(seed, fast_folder, kinds).run().broken]
+        clean(fast_folder)
+    assert broken == []
