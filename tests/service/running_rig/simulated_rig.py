@@ -134,7 +134,7 @@ class SmallRig:
         **plant: float,
     ) -> None:
         self.settings = control or settings()
-        self.ticks = round(began_s / TICK_S)
+        self.ticks, self.needs_proof = round(began_s / TICK_S), needs_proof
         self.is_cell_silent = False
         self.suspended_s = 0.0
         self.beats = self.settings.supervision.lease_s is not None
@@ -152,7 +152,7 @@ class SmallRig:
             rig_name="rig",
             force_max_n=self.settings.limits.force_max_n,
             has_lease=self.settings.supervision.lease_s is not None,
-            require_byte_order_echo=needs_proof,
+            require_byte_order_echo=self.needs_proof,
             supported_bits=BASIC_BITS
             | ControlBit.START_CALIBRATION
             | (ControlBit.START_SELF_TEST if self.settings.self_test else ControlBit(0))
