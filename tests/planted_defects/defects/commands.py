@@ -10,7 +10,7 @@ DEFECTS = (
            "and (self.is_within(beaten_s, now_s) or not is_stopped)", "",
            ("service/running_rig/masters/test_drawn_programs.py",)),
     Defect("of two programs on one host the tare of one is the other's", "registers/writes/last_tares.py",
-           "tared = of_frame(self._last[host], frame.channel) or self._latest(host)", "tared = self._latest(host)",
+           "tared = of_frame(self.by_host[host], frame.channel) or self._latest(host)", "tared = self._latest(host)",
            ("service/running_rig/masters/test_drawn_programs.py",)),
     Defect("the frame of a program that has just hung undoes another one's stop", "control/command_edges.py",
            "            self._lease.stop(now_s, command.peer)\n", "            pass\n",
