@@ -17,6 +17,7 @@ import fcntl
 import json
 import os
 import struct
+import time
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -28,6 +29,8 @@ from gateway.recording.layout import BATCH_PREFIX, MARK, SUFFIX, batch_crc, head
 
 _BATCH_ROWS: Final = 256  # a batch is written early when it is full: 2.5 kHz still gives one write per 0.1 s
 _FORMAT: Final = 1
+_LOCK_TRIES: Final = 100
+_LOCK_PAUSE_S: Final = 0.001
 _DELETED: Final = "somebody has deleted its file"
 
 
@@ -51,10 +54,7 @@ class Recorder:
             directory.mkdir(parents=True, mode=0o700)
         self.number, self.path, descriptor = _create_next(directory)
         self._descriptor: int | None = descriptor
-        with contextlib.suppress(OSError):  # some file systems have no locks
-            fcntl.flock(
-                descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB
-            )  # until it is closed: whoever deletes recordings looks
+        _lock_until_closed(descriptor)
         facts = {"format": _FORMAT, "number": self.number, "started_utc": _utc_now()} | dict(header)
         self._length = self._write_header(header_bytes(json.dumps(facts | {"columns": list(columns)}).encode()))
 
@@ -166,3 +166,16 @@ def _create_next(directory: Path) -> tuple[int, Path, int]:
 
 def _utc_now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def _lock_until_closed(descriptor: int) -> None:
+    """Lock what is recorded: whoever deletes recordings looks, and who looks at a new one holds it for a moment."""
+    for _ in range(_LOCK_TRIES):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            time.sleep(_LOCK_PAUSE_S)
+        except OSError:  # some file systems have no locks
+            return
+        else:
+            return
