@@ -121,7 +121,7 @@ class Bench:
         self.alter_sample: Callable[[ForceSample], ForceSample] = lambda sample: sample
         self.releases = 0
         self.refused: EdgeRefusal | None = None
-        self.clearing_zeroes_heartbeat = self.ignores_clearing = False
+        self.ignores_clearing = False
 
     @property
     def now_s(self) -> float:
@@ -171,13 +171,12 @@ class Bench:
         self.events.extend(output.events)
         self.releases += output.release_owner
         if output.clear_command and not self.ignores_clearing:
-            cleared = self.command._replace(
+            self.command = self.command._replace(
                 control_word=ControlBit(0),
                 force_setpoint_n=0.0,
                 voltage_setpoint_v=0.0,
                 number=self.command.number + 1,
             )
-            self.command = cleared._replace(heartbeat=0) if self.clearing_zeroes_heartbeat else cleared
         return output
 
     def run(self, seconds: float) -> Output:

@@ -38,7 +38,6 @@ def test_a_reset_needs_its_rise_setpoint_zero_and_enable_zero():
 
 def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
     bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
-    bench.clearing_zeroes_heartbeat = True  # a bank's own clearing is no beat
     bench.heartbeat_every_ms = 50
     bench.run(0.3)
     bench.enable(12.0)
@@ -46,13 +45,12 @@ def test_a_reset_with_a_lease_needs_a_heartbeat_since_the_fault():
     bench.heartbeat_every_ms = 0
     bench.seconds_until(has_fault(FaultCode.MASTER_LOST), 0.5)
     bench.run(0.05)
-    assert bench.command.heartbeat == 0
     assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
     bench.write(control_word=ControlBit(0), heartbeat=5)
     assert bench.write(control_word=ControlBit.RESET_FAULT, heartbeat=6).state is State.OFF
 
 
-def test_behind_a_defect_of_ours_the_clearing_is_no_heartbeat_either():
+def test_behind_a_defect_of_ours_the_clearing_is_no_heartbeat():
     bench = Bench(settings(lease_s=0.2, lease_action=LeaseAction.FAULT))
     bench.heartbeat_every_ms = 50
     bench.run(0.3)
@@ -62,7 +60,7 @@ def test_behind_a_defect_of_ours_the_clearing_is_no_heartbeat_either():
     assert bench.controller.fail_internally(bench.now_s).clear_command
     bench.run(0.01)
     bench.command = bench.command._replace(
-        control_word=ControlBit(0), force_setpoint_n=0.0, heartbeat=0, number=bench.command.number + 1
+        control_word=ControlBit(0), force_setpoint_n=0.0, number=bench.command.number + 1
     )
     bench.run(0.05)
     assert bench.write(control_word=ControlBit.RESET_FAULT).state is State.FAULT
@@ -85,7 +83,6 @@ def test_a_reset_may_have_the_value_of_the_beat_before_it():
     """A master that beats by a write of its own, behind the clearing of its command, has beaten since the fault."""
     bench = enabled(settings(lease_s=0.2))
     bench.heartbeat_every_ms = 50
-    bench.clearing_zeroes_heartbeat = True
     bench.force(12.0)
     bench.run(0.5)
     bench.line = bench.line._replace(fault=FaultCode.OUTPUT_LOST)

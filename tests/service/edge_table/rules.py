@@ -97,15 +97,16 @@ class Verdict:
             return Reason.NONE
         if self._state is State.FAULT:
             return Reason.FAULT_LATCHED
-        if self._place.is_given_up and self._is_stale:
-            return Reason.HEARTBEAT_STALE
-        return Reason.NOT_READY if self._place.is_stopped else Reason.NONE
+        return self._of_beat() or (Reason.NOT_READY if self._place.is_stopped else Reason.NONE)
+
+    def _of_beat(self) -> Reason:
+        return Reason.HEARTBEAT_STALE if self._place.is_given_up and self._is_stale else Reason.NONE
 
     def _of_runs(self) -> list[Reason]:
         found = []
         for bit, reason in ((CALIBRATE, Reason.CALIBRATION_REFUSED), (SELF_TEST, Reason.SELF_TEST_REFUSED)):
             if self._rises & bit:
-                found += [self._of_run(reason), reason if self.force_n else Reason.NONE]
+                found += [self._of_run(reason), self._of_beat(), reason if self.force_n else Reason.NONE]
         both = self._rises & RUNS == RUNS
         return [*found, Reason.SELF_TEST_REFUSED if both else Reason.NONE]
 
