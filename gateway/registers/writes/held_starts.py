@@ -107,10 +107,8 @@ class HeldEnables:
         self.frames = FrameBeats()
         self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
         self._told_s = 0.0
-        self._ahead: Command | None = (
-            None  # whose heartbeat is noted later; is_moving: it was another one than in the one before
-        )
-        self._is_moving = False
+        self._ahead: Command | None = None  # whose heartbeat is noted later
+        self._is_moving = False  # it was another one than in the command before
 
     def note(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
