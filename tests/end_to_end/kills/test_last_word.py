@@ -215,6 +215,7 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     assert shared_devices.settings_since(plugged_at_s)[0].voltage_v == 0.0
     assert rested.status()["state"] == FAULT, "latched"
     rested.wait_until(lambda status: not rested.write(0, 2, 0).isError() and rested.status()["state"] == OFF)
+    rested.wait_until(lambda status: status["status_word"] & 2)  # the output is asked anew behind a reset
     pressing(rested)  # and the new line has been handed to the guardian as well:
     killed_at_s = time.monotonic()
     os.kill(rested.ready["pids"]["control"], signal.SIGKILL)
