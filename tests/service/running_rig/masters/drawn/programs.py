@@ -1,6 +1,6 @@
 """Programs of masters as a seed draws them: what frames they write, how their heartbeat goes, by which connections."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
 from struct import pack
 
@@ -23,9 +23,11 @@ Frame = Callable[[SmallRig, Peer, int, int, int], None]
 """Writes with a control word, a setpoint in counts and a heartbeat."""
 KNOWN = ENABLE | RESET | TARE | TAKE | VALVE | CALIBRATE | SELF_TEST
 BITS = range(16)
+CERTIFICATES = {"plc": ("10.0.0.7", "10.0.0.8"), "robot": ("10.0.0.7",)}
+"""Names, and by which addresses each comes."""
 
 
-def _words(address: int, *names: str) -> Frame:
+def words_frame(address: int, *names: str) -> Frame:
     def write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
         told = {"word": word, "force": force, "beat": beat, "": 0}
         rig.write(address, *(told[name] for name in names), peer=peer)
@@ -33,7 +35,7 @@ def _words(address: int, *names: str) -> Frame:
     return write
 
 
-def _floats(address: int, *names: str) -> Frame:
+def floats_frame(address: int, *names: str) -> Frame:
     def write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
         told = {"word": word, "force": force / 100, "beat": beat, "": 0}
         rig.bank.write_registers(address, pack(f">{len(names)}f", *(told[name] for name in names)), peer)
@@ -51,7 +53,7 @@ def _each_coil(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> N
             rig.bank.write_bits(bit, [bool(word >> bit & 1)], peer)
 
 
-def _mask(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
+def write_mask(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
     rig.bank.mask_write(0, 0xFFFF & ~KNOWN, word & KNOWN, peer)
 
 
@@ -61,10 +63,10 @@ def _read_and_write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int)
     rig.bank.read_registers(100, 8, peer)
 
 
-_BLOCK = _words(0, "word", "force", "", "", "beat")
-_WORD_AND_FORCE, _FLOATS = _words(0, "word", "force"), _floats(200, "word", "force")
-_BEAT, _WORD, _FORCE = _words(4, "beat"), _words(0, "word"), _words(1, "force")
-_FORCE_AND_BEAT = _words(1, "force", "", "", "beat")
+_BLOCK = words_frame(0, "word", "force", "", "", "beat")
+_WORD_AND_FORCE, _FLOATS = words_frame(0, "word", "force"), floats_frame(200, "word", "force")
+_BEAT, _WORD, _FORCE = words_frame(4, "beat"), words_frame(0, "word"), words_frame(1, "force")
+_FORCE_AND_BEAT = words_frame(1, "force", "", "", "beat")
 PROOF_AT = MAP.find("byte_order_echo").address
 SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "block": (_BLOCK,),
@@ -75,18 +77,18 @@ SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "beat, force, word": (_BEAT, _FORCE, _WORD),
     "word, force, beat": (_WORD, _FORCE, _BEAT),
     "force and beat, word": (_FORCE_AND_BEAT, _WORD),
-    "floats": (_floats(200, "word", "force", "", "", "beat"),),
-    "float force and beat, word": (_floats(202, "force", "", "", "beat"), _WORD),
+    "floats": (floats_frame(200, "word", "force", "", "", "beat"),),
+    "float force and beat, word": (floats_frame(202, "force", "", "", "beat"), _WORD),
     "floats, beat": (_FLOATS, _BEAT),
     "force and beat, coils": (_FORCE_AND_BEAT, _coils),
     "force and beat, coil": (_FORCE_AND_BEAT, _each_coil),
-    "mask, force and beat": (_mask, _FORCE_AND_BEAT),
+    "mask, force and beat": (write_mask, _FORCE_AND_BEAT),
     "read and write": (_read_and_write,),
 }
 
 RUN_COIL_AND_ENABLE_COIL = _each_coil
 """Without enable its last one ends what the others have begun."""
-SILENT = {_WORD, _FORCE, _coils, _each_coil, _mask, _WORD_AND_FORCE, _FLOATS}
+SILENT = {_WORD, _FORCE, _coils, _each_coil, write_mask, _WORD_AND_FORCE, _FLOATS}
 """Frames without a heartbeat."""
 
 
@@ -103,6 +105,11 @@ def zeros_by_each_function(rig: SmallRig, peer: Peer) -> dict[str, Callable[[], 
     }
 
 
+def is_serial(host: str) -> bool:
+    """Whether a host is all masters of a serial face, which have no connection."""
+    return host.startswith("serial")
+
+
 ZEROS = 0, 0
 WAITING = -1
 
@@ -111,17 +118,21 @@ class Program:
     """Writes its frames in each cycle. asks: control word and force of this cycle, None while it is idle; wants: what it goes
     for; is_live: its heartbeat moves, and it does as it is told; else all that it writes stays as it is."""
 
-    def __init__(self, draw: Random, host: str, place: int) -> None:
+    def __init__(
+        self, draw: Random, host: str, place: int, spellings: Mapping[str, tuple[Frame, ...]] = SPELLINGS
+    ) -> None:
         self._draw, self._host = draw, host
-        self.spelling = draw.choice(tuple(SPELLINGS))
-        self.frames = SPELLINGS[self.spelling]
+        self.spelling = draw.choice(tuple(spellings))
+        self.frames = spellings[self.spelling]
         self.period = draw.choice((2, 3, 5, 5, 10, 10, 20, 50))
         self._due, self._gap, self._at, self._next = draw.randrange(self.period), draw.choice((0, 0, 1)), WAITING, 0
-        self._counts, self._beat = host == "plc" or draw.random() < 0.7, draw.randrange(1, 65000)
+        self._counts, self._beat = host in CERTIFICATES or draw.random() < 0.7, draw.randrange(1, 65000)
         self._connects = draw.choice(("once", "once", "each frame", "each cycle", "now and then"))
         if not self._counts:
             self._connects = "once"  # behind a restart nobody can tell it from two that hung
         self._port = 5000 + 1000 * place
+        if is_serial(host):
+            self._connects, self._port = "once", 0
         self.is_live, self.moved_s = True, -99.0
         self.wants: tuple[int, int] | None = None
         self.asks: tuple[int, int] | None = None
@@ -147,18 +158,14 @@ class Program:
         return bool(shared)
 
     @property
-    def is_honest(self) -> bool:
-        return self.is_live and self.period <= 20
-
-    @property
     def identity(self) -> str:
-        return "certificate plc" if self._host == "plc" else self._host
+        return f"certificate {self._host}" if self._host in CERTIFICATES else self._host
 
     def peer(self) -> Peer:
         """By which connection the next frame comes."""
         self._port += self._connects == "each frame" or (self._connects == "now and then" and self._draw.random() < 0.1)
-        if self._host == "plc":
-            return Peer(self._draw.choice(("10.0.0.7", "10.0.0.8")), self._port, name="plc")
+        if self._host in CERTIFICATES:
+            return Peer(self._draw.choice(CERTIFICATES[self._host]), self._port, name=self._host)
         return Peer(self._host, self._port)
 
     def due(self, tick: int) -> list[Frame]:
