@@ -2,8 +2,10 @@
 
 import pytest
 
-from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS
+from gateway.modbus import Peer
+from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER
 
 SEEDS = 50000, 50100, 50200, 50300, 50400, 50500
 
@@ -14,3 +16,16 @@ def test_what_hangs_begins_nothing_on_any_face_and_what_goes_on_has_its_force(fi
         scene = WideScene(seed)
         scene.play(STEPS)
         assert scene.rig.trace
+
+
+def test_what_hung_begins_by_none_of_the_connections_of_its_pool() -> None:
+    """By one of them it had come last before its heartbeat moved, by the other one."""
+    rig = begun()
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    first, second = (Peer(OTHER.host, port) for port in (4002, 4003))
+    for beat, peer in ((4, first), (5, second), (6, second)):
+        assert rig.run(0.05).answer(0, ENABLE, 1200, 0, 0, beat, peer=peer)
+    rig.is_cell_silent = False
+    rig.run(0.2)
+    assert rig.answer(0, ENABLE, 1200, 0, 0, 6, peer=first)
