@@ -37,7 +37,7 @@ class Laws:
         self.moved_s: dict[str, float] = {}  # by something that was meant just then, not by a frame that flows
         self.begun_s: dict[str, float] = {}
         self.excused: dict[str, float] = {}  # until when the frames of a host may begin, for nobody knows who had hung
-        self.tared: set[tuple[str, str]] = set()  # of which host, from which address
+        self.tared: set[tuple[str, tuple[str, int]]] = set()  # of which host, by which connection of a pool
         self.zero_s: dict[str, float] = {}
         self.ownerless_s: float | None = None
         self.writes = 0
@@ -46,6 +46,10 @@ class Laws:
     def longest_period(self) -> int:
         """Return the ticks of a cycle that is short enough to keep the lease up."""
         return max(2, round(0.57 * self.lease_s / TICK_S))
+
+    def longest_s(self, host: str) -> float:
+        """Return the time in which each frame of a host comes once, and a lease is over, s."""
+        return max(self.lease_s, *(p.period * TICK_S for p in self.programs if p.identity == host)) + TICK_S
 
     def meant(self, host: str) -> None:
         self.moved_s[host] = self.rig.now()
@@ -85,26 +89,26 @@ class Laws:
             and rig.bank.command.peer == host
             and bool(int(rig.bank.command.control_word) & TARE)
         )
+        way = peer.host, peer.port if program.pools else 0
         about = f"{program} {asks}: {'; '.join(self.told[-14:])}"
         self.note_sent(program, asks, refused)
         if is_begun or is_run or takes:
             self.begun_s[host] = now_s
         is_hung = not any(p.is_live and p.asks for p in self.programs if p.identity == host) and (
-            now_s - self.moved_s.get(host, -99.0)
-            > max(self.lease_s, *(p.period * TICK_S for p in self.programs if p.identity == host)) + TICK_S
+            now_s - self.moved_s.get(host, -99.0) > self.longest_s(host)
         )
         if is_hung:
             if host in self.excused and (is_begun or is_run or takes or rises or tares):
-                self.excused[host] = min(self.excused[host], now_s + self.lease_s)
+                self.excused[host] = min(self.excused[host], now_s + self.longest_s(host))
             if now_s > self.excused.get(host, -99.0):
                 assert not is_begun, f"hung begins: {about}"
                 assert not is_run, f"hung begins a run: {about}"
                 is_begun_now = now_s - self.begun_s.get(host, -99.0) <= self.lease_s
                 assert not rises or is_begun_now, f"hung raises: {about}"
                 assert not takes, f"hung takes over: {about}"
-                assert not (tares and (host, peer.host) in self.tared), f"hung tares again: {about}"
+                assert not (tares and (host, way) in self.tared), f"hung tares again: {about}"
         if tares:
-            self.tared.add((host, peer.host))
+            self.tared.add((host, way))
         if program.is_live and program.period <= self.longest_period() and program.cycles > 1:
             assert program.stale <= MOST_STALE, f"honest is told stale: {about}"
             assert program.held <= 2, f"honest is told held: {about}"

@@ -64,31 +64,31 @@ def _read_and_write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int)
 
 
 _BLOCK = words_frame(0, "word", "force", "", "", "beat")
-_WORD_AND_FORCE, _FLOATS = words_frame(0, "word", "force"), floats_frame(200, "word", "force")
-_BEAT, _WORD, _FORCE = words_frame(4, "beat"), words_frame(0, "word"), words_frame(1, "force")
-_FORCE_AND_BEAT = words_frame(1, "force", "", "", "beat")
+WORD_AND_FORCE, _FLOATS = words_frame(0, "word", "force"), floats_frame(200, "word", "force")
+BEAT, WORD, FORCE = words_frame(4, "beat"), words_frame(0, "word"), words_frame(1, "force")
+FORCE_AND_BEAT = words_frame(1, "force", "", "", "beat")
 PROOF_AT = MAP.find("byte_order_echo").address
 SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "block": (_BLOCK,),
-    "block, beat": (_BLOCK, _BEAT),
-    "beat, block": (_BEAT, _BLOCK),
-    "word and force, beat": (_WORD_AND_FORCE, _BEAT),
-    "force, word, beat": (_FORCE, _WORD, _BEAT),
-    "beat, force, word": (_BEAT, _FORCE, _WORD),
-    "word, force, beat": (_WORD, _FORCE, _BEAT),
-    "force and beat, word": (_FORCE_AND_BEAT, _WORD),
+    "block, beat": (_BLOCK, BEAT),
+    "beat, block": (BEAT, _BLOCK),
+    "word and force, beat": (WORD_AND_FORCE, BEAT),
+    "force, word, beat": (FORCE, WORD, BEAT),
+    "beat, force, word": (BEAT, FORCE, WORD),
+    "word, force, beat": (WORD, FORCE, BEAT),
+    "force and beat, word": (FORCE_AND_BEAT, WORD),
     "floats": (floats_frame(200, "word", "force", "", "", "beat"),),
-    "float force and beat, word": (floats_frame(202, "force", "", "", "beat"), _WORD),
-    "floats, beat": (_FLOATS, _BEAT),
-    "force and beat, coils": (_FORCE_AND_BEAT, _coils),
-    "force and beat, coil": (_FORCE_AND_BEAT, _each_coil),
-    "mask, force and beat": (write_mask, _FORCE_AND_BEAT),
+    "float force and beat, word": (floats_frame(202, "force", "", "", "beat"), WORD),
+    "floats, beat": (_FLOATS, BEAT),
+    "force and beat, coils": (FORCE_AND_BEAT, _coils),
+    "force and beat, coil": (FORCE_AND_BEAT, _each_coil),
+    "mask, force and beat": (write_mask, FORCE_AND_BEAT),
     "read and write": (_read_and_write,),
 }
 
 RUN_COIL_AND_ENABLE_COIL = _each_coil
 """Without enable its last one ends what the others have begun."""
-SILENT = {_WORD, _FORCE, _coils, _each_coil, write_mask, _WORD_AND_FORCE, _FLOATS}
+SILENT = {WORD, FORCE, _coils, _each_coil, write_mask, WORD_AND_FORCE, _FLOATS}
 """Frames without a heartbeat."""
 
 
@@ -133,7 +133,7 @@ class Program:
         self._port = 5000 + 1000 * place
         if is_serial(host):
             self._connects, self._port = "once", 0
-        self.is_live, self.moved_s = True, -99.0
+        self.is_live, self.moved_s, self.pools = True, -99.0, False
         self.wants: tuple[int, int] | None = None
         self.asks: tuple[int, int] | None = None
         self._rests = draw.choice((None, ZEROS))
@@ -141,6 +141,11 @@ class Program:
         self.refused: list[RefusalReason] = []
         self.beat_at, self.is_stale = 0, False
         self.stale = self.held = self.cycles = 0
+
+    @property
+    def may_pool(self) -> bool:
+        """Whether two connections may take turns: not where each brings one of two values, as two programs that hung would."""
+        return self._connects == "once" and self._counts and not is_serial(self._host)
 
     def begin_anew(self) -> None:
         """Forget what it was told."""
@@ -154,7 +159,7 @@ class Program:
 
     def is_like(self, other: "Program") -> bool:
         """Whether frames of the two, on one host, are told apart by nothing but their connection."""
-        shared = set(self.frames) & set(other.frames) - {_WORD, _FORCE}
+        shared = set(self.frames) & set(other.frames) - {WORD, FORCE}
         return bool(shared)
 
     @property
@@ -164,9 +169,10 @@ class Program:
     def peer(self) -> Peer:
         """By which connection the next frame comes."""
         self._port += self._connects == "each frame" or (self._connects == "now and then" and self._draw.random() < 0.1)
+        port = self._port + self._draw.choice((0, 500)) if self.pools else self._port
         if self._host in CERTIFICATES:
-            return Peer(self._draw.choice(CERTIFICATES[self._host]), self._port, name=self._host)
-        return Peer(self._host, self._port)
+            return Peer(self._draw.choice(CERTIFICATES[self._host]), port, name=self._host)
+        return Peer(self._host, port)
 
     def due(self, tick: int) -> list[Frame]:
         """Return the frames that are sent at this tick."""

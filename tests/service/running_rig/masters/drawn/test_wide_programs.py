@@ -3,6 +3,8 @@
 import pytest
 
 from gateway.modbus import Peer
+from gateway.registers.words import State
+from tests.service.running_rig.masters.drawn.laws import LEASE_S
 from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
 from tests.service.running_rig.simulated_rig import ENABLE, OTHER
@@ -29,3 +31,15 @@ def test_what_hung_begins_by_none_of_the_connections_of_its_pool() -> None:
     rig.is_cell_silent = False
     rig.run(0.2)
     assert rig.answer(0, ENABLE, 1200, 0, 0, 6, peer=first)
+
+
+def test_behind_a_stop_a_program_that_hung_does_not_begin_by_a_heartbeat_older_than_a_lease() -> None:
+    """Its cycle was longer than the lease, and the stop took no heartbeat away that was older: it began in each cycle."""
+    rig = begun()
+    rig.write(0, 0, 0, 0, 0, 6, peer=OTHER)
+    rig.run(0.9).write(4, 7, peer=OTHER)
+    rig.run(2 * LEASE_S).write(0, ENABLE, 1200, peer=OTHER)
+    assert rig.loop.decision.state is not State.OFF
+    rig.write(0, 0)
+    for _ in range(3):
+        assert rig.run(2 * LEASE_S).answer(0, ENABLE, 1200, peer=OTHER)

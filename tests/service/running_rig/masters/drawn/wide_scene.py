@@ -7,11 +7,16 @@ from struct import pack
 
 from gateway.modbus import Peer
 from tests.service.running_rig.masters.drawn.programs import (
+    BEAT,
+    FORCE,
+    FORCE_AND_BEAT,
+    SILENT,
     SPELLINGS,
+    WORD,
+    WORD_AND_FORCE,
     Frame,
     Program,
     floats_frame,
-    words_frame,
     write_mask,
 )
 from tests.service.running_rig.masters.drawn.scene import HAPPENINGS, PAGE, Scene
@@ -44,29 +49,18 @@ def _whole_block_as_read(rig: SmallRig, peer: Peer, word: int, force: int, beat:
     rig.write(0, *words, peer=peer)
 
 
-def _beat_while_it_presses(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
-    """Looks first, and writes the heartbeat alone where all is as it is asked for: a hold from a terminal, a page."""
-    standing = rig.words(0, 2)
-    if word & ENABLE and rig.bank.owner == peer.identity and standing == (word & ~TAKE, force):
-        rig.bank.check_registers_readable(100, 1, peer)
-        rig.write(4, beat, peer=peer)
-    else:
-        rig.write(0, word, force, 0, 0, beat, peer=peer)
-
-
-_WORD, _BEAT = words_frame(0, "word"), words_frame(4, "beat")
-_FORCE_AND_BEAT = words_frame(1, "force", "", "", "beat")
+LOW_FLOATS = _low_floats(300, "word", "force")
+SILENT.update({LOW_FLOATS, _read_and_modify})
 WIDE_SPELLINGS: dict[str, tuple[Frame, ...]] = {
     **SPELLINGS,
     "low floats": (_low_floats(300, "word", "force", "", "", "beat"),),
-    "low float force and beat, word": (_low_floats(302, "force", "", "", "beat"), _WORD),
-    "low floats, beat": (_low_floats(300, "word", "force"), _BEAT),
-    "float beat, word and force": (floats_frame(208, "beat"), words_frame(0, "word", "force")),
-    "word and force, low float beat": (words_frame(0, "word", "force"), _low_floats(308, "beat")),
-    "force and beat, read and modify": (_FORCE_AND_BEAT, _read_and_modify),
+    "low float force and beat, word": (_low_floats(302, "force", "", "", "beat"), WORD),
+    "low floats, beat": (LOW_FLOATS, BEAT),
+    "float beat, word and force": (floats_frame(208, "beat"), WORD_AND_FORCE),
+    "word and force, low float beat": (WORD_AND_FORCE, _low_floats(308, "beat")),
+    "force and beat, read and modify": (FORCE_AND_BEAT, _read_and_modify),
     "whole block as read": (_whole_block_as_read,),
-    "masked beat, mask, force": (_mask_beat, write_mask, words_frame(1, "force")),
-    "beat while it presses": (_beat_while_it_presses,),
+    "masked beat, mask, force": (_mask_beat, write_mask, FORCE),
 }
 LEASES_S = 0.05, 0.1, 0.2, 0.35, 0.5, 1.0, 2.0
 
@@ -91,6 +85,8 @@ class WideScene(Scene):
         self.lease_s = Random(f"lease {seed}").choice(LEASES_S)
         self.page_beats, self.page_beat, self.dies_behind = False, 100, 0
         super().__init__(seed)
+        for program in self.programs:  # by two lasting connections
+            program.pools = program.may_pool and Random(f"pool {seed}").random() < 0.3
         self.told[0] += f" lease {self.lease_s}"
 
     def happen_elsewhere(self, name: str) -> None:
@@ -136,6 +132,7 @@ class WideScene(Scene):
 
     def stand_still(self, ticks: int, *, is_suspended: bool) -> None:
         """The process does not come by; suspended, its clock does not go on either."""
+        self.dies_behind = 0  # who wakes and dies at once has told the next process nothing
         rig, before = self.rig, self.rig.ticks
         waits = {
             id(program): self.draw.random() < 0.5 for program in self.programs
