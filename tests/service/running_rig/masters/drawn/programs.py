@@ -207,7 +207,7 @@ class Program:
 
     def _obeyed(self, before: tuple[int, int] | None, refused: list[RefusalReason]) -> tuple[int, int] | None:
         assert self.wants
-        if before == ZEROS and not refused:
+        if before and not refused:
             self.held = 0
         if RefusalReason.CALIBRATION_HELD in refused:
             return ZEROS
