@@ -4,8 +4,9 @@ What hangs begins, raises, takes over and tares nothing behind one length of the
 goes on is told that it stands still in no more than two cycles in a row, and that it keeps a bit up no more than twice.
 
 Where nobody can know who hung: behind a power cut each host may begin for one lease, anew in a process that begins before that
-is over. A certificate that writes by lasting connections from two addresses may be two programs that tare beside each other:
-its last tare counts of each.
+is over; so may a host whose own 0, within 0.8 s before the end of a process, was of another one of its programs. A certificate
+that writes by lasting connections from two addresses may be two programs that tare beside each other: its last tare counts of
+each, and so it is with the connections of a pool.
 """
 
 from gateway.control import ControlSettings, LeaseAction
@@ -73,6 +74,8 @@ class Laws:
         is_begun_and_stopped = frame is RUN_COIL_AND_ENABLE_COIL and not asks[0] & ENABLE
         if (state in PRESSING or is_begun_and_stopped) and rig.loop.decision.state not in PRESSING:
             self.stopped_at["" if state is State.CALIBRATING else host] = self.writes
+            if owner == host:
+                self.zero_s[host] = now_s
         is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
         is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken
         is_begun = is_begun and not is_local
