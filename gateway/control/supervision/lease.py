@@ -77,11 +77,11 @@ class Lease:
         keep_latest(self._unbeaten, who, None)
 
     def stop(self, now_s: float, who: str) -> None:
-        """Let no beat of before count of any other master that has beaten within one length: this one has switched the output
-        off. Its own count for one length, as long as a cycle may bring the next frame: of two programs on one host that hung
-        one may write 0, and the other 1."""
+        """Let no beat of before count of the master that has the lease, nor of any other that has beaten within one length:
+        this one has switched the output off. Its own count for one length, as long as a cycle may bring the next frame: of two
+        programs on one host that hung one may write 0, and the other 1."""
         for other, (heartbeat, beaten_s) in self._beats.items():
-            if other != who and self.is_within(beaten_s, now_s):
+            if other != who and (other == self._master or self.is_within(beaten_s, now_s)):
                 self._beats[other] = heartbeat, nan
         keep_latest(self._stopped_s, who, now_s)
 

@@ -209,7 +209,9 @@ class Admission:
 
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
-        may allow. Nothing of it is taken but that its program goes on, and of who does not own which bits are kept at 1."""
+        may allow, and of a bit that no rig has nobody asks whether it can ever become good: whoever corrects it brings another
+        heartbeat, or writes 0. Nothing of it is taken but that its program goes on, and of who does not own which bits are kept
+        at 1."""
         if reason is RefusalReason.BYTE_ORDER_UNPROVEN and not self.held_enables.has_beaten(write.host):
             return  # a person's own proof is waited for
         offsets, standing = self._offsets(write), int(self._commands.values[HEARTBEAT])

@@ -155,7 +155,10 @@ class HeldEnables:
         """Whether a frame brings nothing new, beside what was refused last or behind itself: no heartbeat of its host has moved
         since it came last."""
         sent = of_frame(refused.sent, frame.channel)
-        if not self._stands(host, frame, sent.moves if sent else refused.moves):
+        moves = sent.moves if sent else refused.moves
+        if frame.heartbeat is not None:  # the same bytes by another connection of a pool are of the same program
+            moves = max([moves, *(other.moves for other in refused.sent.values() if other.data == frame.data)])
+        if not self._stands(host, frame, moves):
             return False
         is_as_before = frame.heartbeat is not None and self.frames.has_brought(frame.channel, frame.heartbeat)
         return refused.is_same(frame) or (

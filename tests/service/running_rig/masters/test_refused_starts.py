@@ -289,3 +289,12 @@ def test_without_a_lease_a_tare_needs_no_other_heartbeat() -> None:
     for _ in range(2):
         rig.write(0, TARE, 0, 0, 0, BEAT)
     assert rig.state is State.OFF
+
+
+@pytest.mark.parametrize("word", [0x7FFF, 0x8003])
+def test_whoever_corrects_a_word_that_no_rig_knows_begins_with_its_next_heartbeat(word: int) -> None:
+    for beat, refused in ((BEAT, STALE), (BEAT + 1, None)):
+        rig = SmallRig(_control(LeaseAction.FAULT))
+        unknown = rig.answer(0, word, 1200, 0, 0, BEAT)
+        answer = rig.run(0.1).answer(0, ENABLE, 1200, 0, 0, beat)
+        assert unknown and (answer and answer.reason) is refused

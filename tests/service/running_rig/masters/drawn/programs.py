@@ -1,6 +1,6 @@
 """Programs of masters as a seed draws them: what frames they write, how their heartbeat goes, by which connections."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from random import Random
 from struct import pack
 
@@ -23,9 +23,11 @@ Frame = Callable[[SmallRig, Peer, int, int, int], None]
 """Writes with a control word, a setpoint in counts and a heartbeat."""
 KNOWN = ENABLE | RESET | TARE | TAKE | VALVE | CALIBRATE | SELF_TEST
 BITS = range(16)
+CERTIFICATES = {"plc": ("10.0.0.7", "10.0.0.8"), "robot": ("10.0.0.7",)}
+"""Names, and by which addresses each comes."""
 
 
-def _words(address: int, *names: str) -> Frame:
+def words_frame(address: int, *names: str) -> Frame:
     def write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
         told = {"word": word, "force": force, "beat": beat, "": 0}
         rig.write(address, *(told[name] for name in names), peer=peer)
@@ -33,7 +35,7 @@ def _words(address: int, *names: str) -> Frame:
     return write
 
 
-def _floats(address: int, *names: str) -> Frame:
+def floats_frame(address: int, *names: str) -> Frame:
     def write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
         told = {"word": word, "force": force / 100, "beat": beat, "": 0}
         rig.bank.write_registers(address, pack(f">{len(names)}f", *(told[name] for name in names)), peer)
@@ -51,7 +53,7 @@ def _each_coil(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> N
             rig.bank.write_bits(bit, [bool(word >> bit & 1)], peer)
 
 
-def _mask(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
+def write_mask(rig: SmallRig, peer: Peer, word: int, force: int, beat: int) -> None:
     rig.bank.mask_write(0, 0xFFFF & ~KNOWN, word & KNOWN, peer)
 
 
@@ -61,32 +63,32 @@ def _read_and_write(rig: SmallRig, peer: Peer, word: int, force: int, beat: int)
     rig.bank.read_registers(100, 8, peer)
 
 
-_BLOCK = _words(0, "word", "force", "", "", "beat")
-_WORD_AND_FORCE, _FLOATS = _words(0, "word", "force"), _floats(200, "word", "force")
-_BEAT, _WORD, _FORCE = _words(4, "beat"), _words(0, "word"), _words(1, "force")
-_FORCE_AND_BEAT = _words(1, "force", "", "", "beat")
+_BLOCK = words_frame(0, "word", "force", "", "", "beat")
+WORD_AND_FORCE, _FLOATS = words_frame(0, "word", "force"), floats_frame(200, "word", "force")
+BEAT, WORD, FORCE = words_frame(4, "beat"), words_frame(0, "word"), words_frame(1, "force")
+FORCE_AND_BEAT = words_frame(1, "force", "", "", "beat")
 PROOF_AT = MAP.find("byte_order_echo").address
 SPELLINGS: dict[str, tuple[Frame, ...]] = {
     "block": (_BLOCK,),
-    "block, beat": (_BLOCK, _BEAT),
-    "beat, block": (_BEAT, _BLOCK),
-    "word and force, beat": (_WORD_AND_FORCE, _BEAT),
-    "force, word, beat": (_FORCE, _WORD, _BEAT),
-    "beat, force, word": (_BEAT, _FORCE, _WORD),
-    "word, force, beat": (_WORD, _FORCE, _BEAT),
-    "force and beat, word": (_FORCE_AND_BEAT, _WORD),
-    "floats": (_floats(200, "word", "force", "", "", "beat"),),
-    "float force and beat, word": (_floats(202, "force", "", "", "beat"), _WORD),
-    "floats, beat": (_FLOATS, _BEAT),
-    "force and beat, coils": (_FORCE_AND_BEAT, _coils),
-    "force and beat, coil": (_FORCE_AND_BEAT, _each_coil),
-    "mask, force and beat": (_mask, _FORCE_AND_BEAT),
+    "block, beat": (_BLOCK, BEAT),
+    "beat, block": (BEAT, _BLOCK),
+    "word and force, beat": (WORD_AND_FORCE, BEAT),
+    "force, word, beat": (FORCE, WORD, BEAT),
+    "beat, force, word": (BEAT, FORCE, WORD),
+    "word, force, beat": (WORD, FORCE, BEAT),
+    "force and beat, word": (FORCE_AND_BEAT, WORD),
+    "floats": (floats_frame(200, "word", "force", "", "", "beat"),),
+    "float force and beat, word": (floats_frame(202, "force", "", "", "beat"), WORD),
+    "floats, beat": (_FLOATS, BEAT),
+    "force and beat, coils": (FORCE_AND_BEAT, _coils),
+    "force and beat, coil": (FORCE_AND_BEAT, _each_coil),
+    "mask, force and beat": (write_mask, FORCE_AND_BEAT),
     "read and write": (_read_and_write,),
 }
 
 RUN_COIL_AND_ENABLE_COIL = _each_coil
 """Without enable its last one ends what the others have begun."""
-SILENT = {_WORD, _FORCE, _coils, _each_coil, _mask, _WORD_AND_FORCE, _FLOATS}
+SILENT = {WORD, FORCE, _coils, _each_coil, write_mask, WORD_AND_FORCE, _FLOATS}
 """Frames without a heartbeat."""
 
 
@@ -103,6 +105,11 @@ def zeros_by_each_function(rig: SmallRig, peer: Peer) -> dict[str, Callable[[], 
     }
 
 
+def is_serial(host: str) -> bool:
+    """Whether a host is all masters of a serial face, which have no connection."""
+    return host.startswith("serial")
+
+
 ZEROS = 0, 0
 WAITING = -1
 
@@ -111,18 +118,22 @@ class Program:
     """Writes its frames in each cycle. asks: control word and force of this cycle, None while it is idle; wants: what it goes
     for; is_live: its heartbeat moves, and it does as it is told; else all that it writes stays as it is."""
 
-    def __init__(self, draw: Random, host: str, place: int) -> None:
+    def __init__(
+        self, draw: Random, host: str, place: int, spellings: Mapping[str, tuple[Frame, ...]] = SPELLINGS
+    ) -> None:
         self._draw, self._host = draw, host
-        self.spelling = draw.choice(tuple(SPELLINGS))
-        self.frames = SPELLINGS[self.spelling]
+        self.spelling = draw.choice(tuple(spellings))
+        self.frames = spellings[self.spelling]
         self.period = draw.choice((2, 3, 5, 5, 10, 10, 20, 50))
         self._due, self._gap, self._at, self._next = draw.randrange(self.period), draw.choice((0, 0, 1)), WAITING, 0
-        self._counts, self._beat = host == "plc" or draw.random() < 0.7, draw.randrange(1, 65000)
+        self._counts, self._beat = host in CERTIFICATES or draw.random() < 0.7, draw.randrange(1, 65000)
         self._connects = draw.choice(("once", "once", "each frame", "each cycle", "now and then"))
         if not self._counts:
             self._connects = "once"  # behind a restart nobody can tell it from two that hung
         self._port = 5000 + 1000 * place
-        self.is_live, self.moved_s = True, -99.0
+        if is_serial(host):
+            self._connects, self._port = "once", 0
+        self.is_live, self.moved_s, self.pools = True, -99.0, False
         self.wants: tuple[int, int] | None = None
         self.asks: tuple[int, int] | None = None
         self._rests = draw.choice((None, ZEROS))
@@ -130,6 +141,11 @@ class Program:
         self.refused: list[RefusalReason] = []
         self.beat_at, self.is_stale = 0, False
         self.stale = self.held = self.cycles = 0
+
+    @property
+    def may_pool(self) -> bool:
+        """Whether two connections may take turns: not where each brings one of two values, as two programs that hung would."""
+        return self._connects == "once" and self._counts and not is_serial(self._host)
 
     def begin_anew(self) -> None:
         """Forget what it was told."""
@@ -143,23 +159,20 @@ class Program:
 
     def is_like(self, other: "Program") -> bool:
         """Whether frames of the two, on one host, are told apart by nothing but their connection."""
-        shared = set(self.frames) & set(other.frames) - {_WORD, _FORCE}
+        shared = set(self.frames) & set(other.frames) - {WORD, FORCE}
         return bool(shared)
 
     @property
-    def is_honest(self) -> bool:
-        return self.is_live and self.period <= 20
-
-    @property
     def identity(self) -> str:
-        return "certificate plc" if self._host == "plc" else self._host
+        return f"certificate {self._host}" if self._host in CERTIFICATES else self._host
 
     def peer(self) -> Peer:
         """By which connection the next frame comes."""
         self._port += self._connects == "each frame" or (self._connects == "now and then" and self._draw.random() < 0.1)
-        if self._host == "plc":
-            return Peer(self._draw.choice(("10.0.0.7", "10.0.0.8")), self._port, name="plc")
-        return Peer(self._host, self._port)
+        port = self._port + self._draw.choice((0, 500)) if self.pools else self._port
+        if self._host in CERTIFICATES:
+            return Peer(self._draw.choice(CERTIFICATES[self._host]), port, name=self._host)
+        return Peer(self._host, port)
 
     def due(self, tick: int) -> list[Frame]:
         """Return the frames that are sent at this tick."""
@@ -194,7 +207,7 @@ class Program:
 
     def _obeyed(self, before: tuple[int, int] | None, refused: list[RefusalReason]) -> tuple[int, int] | None:
         assert self.wants
-        if before == ZEROS and not refused:
+        if before and not refused:
             self.held = 0
         if RefusalReason.CALIBRATION_HELD in refused:
             return ZEROS

@@ -1,5 +1,6 @@
 """A rig with programs on two hosts, some of which hang, and with people, as a seed draws them: deaths, ends, power cuts."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
 from random import Random
@@ -15,8 +16,8 @@ from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover, left_of
 from tests.control.bench import settings
 from tests.control.valve.valve_bench import SHARE
-from tests.service.running_rig.masters.drawn_laws import LEASE_S, PRESSING, Laws
-from tests.service.running_rig.masters.drawn_programs import Program, zeros_by_each_function
+from tests.service.running_rig.masters.drawn.laws import LEASE_S, PRESSING, Laws
+from tests.service.running_rig.masters.drawn.programs import SPELLINGS, Program, is_serial, zeros_by_each_function
 from tests.service.running_rig.simulated_rig import (
     CALIBRATE,
     ENABLE,
@@ -42,27 +43,37 @@ HAPPENINGS = (
 class Scene(Laws):
     """Draws; the laws judge."""
 
+    hosts: tuple[str, ...] = ("10.0.0.5", "10.0.0.6", "plc")
+    counts: tuple[int, ...] = (1, 2)
+    spellings = SPELLINGS
+    happenings: tuple[str, ...] = HAPPENINGS
+
     def __init__(self, seed: int) -> None:
         self.seed = seed
         self.draw = draw = Random(seed)
-        control = settings(lease_s=LEASE_S, lease_action=draw.choice(tuple(LeaseAction)))
+        control = settings(lease_s=self.lease_s, lease_action=draw.choice(tuple(LeaseAction)))
         valve = ValveControl(pull_area_share=SHARE, safe=draw.choice(tuple(SafeDirection)))
         ramp = Defaults(force_ramp_n_per_s=draw.choice((5.0, 30.0, 200.0)))
         self.control = replace(
             control, defaults=ramp, self_test=SelfTestSettings(), valve=valve if draw.random() < 0.2 else None
         )
         self.needs_proof = draw.random() < 0.2
-        hosts = draw.sample(("10.0.0.5", "10.0.0.6", "plc"), draw.choice((1, 2)))
+        hosts = draw.sample(self.hosts, draw.choice(self.counts))
         super().__init__()
-        for place, host in enumerate(host for host in hosts for _ in range(draw.choice((1, 1, 2)))):
-            program = Program(draw, host, place)
+        for place, host in enumerate(self.hosts_of_programs(hosts)):
+            program = Program(draw, host, place, self.spellings)
             while any(other.identity == program.identity and program.is_like(other) for other in self.programs):
-                program = Program(draw, host, place)
+                program = Program(draw, host, place, self.spellings)
             self.programs.append(program)
         self.kept, self.left = dict[str, Any](), dict[str, Any]()
         self.told = [f"{seed}: {self.control.supervision.lease_action.name}, {', '.join(map(str, self.programs))}"]
         self.rig = SmallRig(self.control, needs_proof=self.needs_proof)
         self.begin_process(None, self.rig)
+
+    def hosts_of_programs(self, hosts: list[str]) -> Iterator[str]:
+        for host in hosts:
+            for _ in range(1 if is_serial(host) else self.draw.choice((1, 1, 2))):  # a bus has one master
+                yield host
 
     # -- processes
 
@@ -90,6 +101,9 @@ class Scene(Laws):
             self.tared.clear()
         else:
             self.kept["owner"] = owner
+        for host, until_s in self.excused.items():
+            if rig.now() <= until_s:  # this process has known it for less than a lease
+                self.excused[host] = inf
         for host, zero_s in self.zero_s.items():
             if rig.now() - zero_s < 0.8:
                 self.excused[host] = inf
@@ -105,7 +119,7 @@ class Scene(Laws):
 
     def happen(self) -> None:
         draw, rig, program = self.draw, self.rig, self.draw.choice(self.programs)
-        name = draw.choice(HAPPENINGS)
+        name = draw.choice(self.happenings)
         self.told.append(f"{rig.now():.2f} {self.programs.index(program)} {name}")
         if name in ("hang", "go on"):
             program.is_live = name == "go on"
@@ -163,7 +177,7 @@ class Scene(Laws):
         self.told[-1] += f" {way}"
         if way == "block":
             self.meant(host)  # with a heartbeat that may be another one
-        self.tared.discard(host)
+        self.forget_tares(host)
         self.zero_s[host] = rig.now()
         self.answer(ways[way])
 
@@ -203,10 +217,10 @@ class Scene(Laws):
             if p.asks and not p.asks[0] & ENABLE:
                 p.asks = None  # whose 0 would be another one's stop
         for p in others:
-            if p.asks and (not p.asks[0] & ENABLE or rig.loop.decision.state is State.FAULT):
-                p.asks = None  # its setpoint would be in the way of a reset
+            if p.asks and not p.asks[0] & ENABLE:
+                p.asks = None
             p.is_live = False
-        honest.period = min(honest.period, 20)
+        honest.period = min(honest.period, self.longest_period())
         honest.is_live, honest.wants = True, (ENABLE, 900)
         honest.begin_anew()
         honest.takes_if_told = honest.resets = True
@@ -214,7 +228,9 @@ class Scene(Laws):
         self.told.append(f"{rig.now():.2f} calm {self.programs.index(honest)}")
         if rig.controller.active_run.is_local:
             self.answer(lambda: rig.write(0, 0, peer=PAGE))
-        for _ in range(400):
+        for _ in range(400 + round(2.0 * (self.lease_s - LEASE_S) / TICK_S)):
+            for p in others if rig.loop.decision.state is State.FAULT else ():
+                p.asks = None  # its setpoint would be in the way of a reset
             self.tick()
         assert rig.loop.decision.state in PRESSING, f"honest has no force {honest}: {'; '.join(self.told[-14:])}"
         assert rig.bank.owner == honest.identity, f"honest owns not: {honest}: {'; '.join(self.told[-14:])}"

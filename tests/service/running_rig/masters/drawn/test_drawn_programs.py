@@ -10,8 +10,8 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
-from tests.service.running_rig.masters.drawn_laws import LEASE_S
-from tests.service.running_rig.masters.drawn_scene import Scene
+from tests.service.running_rig.masters.drawn.laws import LEASE_S
+from tests.service.running_rig.masters.drawn.scene import Scene
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, RESET, TAKE, TARE, SmallRig
 
 SEEDS = (

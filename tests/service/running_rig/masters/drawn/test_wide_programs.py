@@ -1,0 +1,45 @@
+"""Wider scenes: serial faces, certificates, more spellings, other leases, standstills."""
+
+import pytest
+
+from gateway.modbus import Peer
+from gateway.registers.words import State
+from tests.service.running_rig.masters.drawn.laws import LEASE_S
+from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
+from tests.service.running_rig.masters.drawn.wide_scene import WideScene
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER
+
+SEEDS = 50000, 50100, 50200, 50300, 50400, 50500
+
+
+@pytest.mark.parametrize("first", SEEDS)
+def test_what_hangs_begins_nothing_on_any_face_and_what_goes_on_has_its_force(first: int, budget: int) -> None:
+    for seed in range(first, first + budget):
+        scene = WideScene(seed)
+        scene.play(STEPS)
+        assert scene.rig.trace
+
+
+def test_what_hung_begins_by_none_of_the_connections_of_its_pool() -> None:
+    """By one of them it had come last before its heartbeat moved, by the other one."""
+    rig = begun()
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    first, second = (Peer(OTHER.host, port) for port in (4002, 4003))
+    for beat, peer in ((4, first), (5, second), (6, second)):
+        assert rig.run(0.05).answer(0, ENABLE, 1200, 0, 0, beat, peer=peer)
+    rig.is_cell_silent = False
+    rig.run(0.2)
+    assert rig.answer(0, ENABLE, 1200, 0, 0, 6, peer=first)
+
+
+def test_behind_a_stop_a_program_that_hung_does_not_begin_by_a_heartbeat_older_than_a_lease() -> None:
+    """Its cycle was longer than the lease, and the stop took no heartbeat away that was older: it began in each cycle."""
+    rig = begun()
+    rig.write(0, 0, 0, 0, 0, 6, peer=OTHER)
+    rig.run(0.9).write(4, 7, peer=OTHER)
+    rig.run(2 * LEASE_S).write(0, ENABLE, 1200, peer=OTHER)
+    assert rig.loop.decision.state is not State.OFF
+    rig.write(0, 0)
+    for _ in range(3):
+        assert rig.run(2 * LEASE_S).answer(0, ENABLE, 1200, peer=OTHER)
