@@ -64,7 +64,7 @@ class ForceLoop:
         self._timing, self._is_retimed = timing, True
 
     def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
-        """Swap the calibration and the timing that goes with it; the lags' model goes on from where it is, the trim keeps what it
+        """Swap the calibration and its timing; the lags' model goes on from where it is, the trim keeps what it
         has learned. given_n: contact force that the slide need not give."""
         law = self.feedforward
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
