@@ -1,7 +1,7 @@
 """What must hold of force and voltage, whatever the machine is: by the contract of the registers and the true force, and not by
 asking the code. Laws of a held force count from when nobody has changed anything for long enough (`calm_s`)."""
 
-from collections import Counter, deque
+from collections import deque
 from math import cos, isfinite
 from typing import TYPE_CHECKING
 
@@ -31,15 +31,13 @@ class Judge:
         self.most_applied_n = self.ramped_n_per_s = 0.0
         self.over = 0
         self.high_since_s: float | None = None
-        self.false_since_s: float | None = None
-        self.smooth_n = 0.0
+        self.off_since_s = self.false_since_s = self.smooth_n = self.measured_n = self.read_n = 0.0
         self.recent: deque[tuple[float, float]] = deque()
         self.top_n: float | None = None
         self.top_why = ""
         self.hunted = False
         self.state = State.OFF
         self.last_sample_s = -1.0
-        self.counts: Counter[str] = Counter()
 
     # -- what a scene tells
 
@@ -49,7 +47,6 @@ class Judge:
 
     def bound(self, top_n: float, why: str) -> None:
         """The true force goes no higher until something else is asked for."""
-        self.counts[why] += 1
         self.top_n, self.top_why = top_n, why
 
     def complain(self, what: str) -> None:
@@ -129,7 +126,7 @@ class Judge:
         if output.status & StatusBit.ENABLED and record.command.mode is Mode.FORCE:
             self._judge_force(record, dt_s)
         else:
-            self.high_since_s = self.false_since_s = None
+            self.high_since_s, self.read_n = None, self.measured_n
             self.in_band_s = record.time_s
             self.recent.clear()
         if self.top_n is not None and record.force_n > self.top_n:
@@ -175,6 +172,8 @@ class Judge:
                 is_so = voltage_v == limits.voltage_min_v
             case _:
                 is_so = abs(voltage_v - asked_v) < 1e-9
+        if abs(output.trim_v) == self.rig.settings.trim.limit_v > 0.0 and output.limited_by is LimitedBy.NONE:
+            self.complain(f"trim {output.trim_v} at its limit, and nothing told")
         if output.limited_by is LimitedBy.TRIM_RANGE:
             is_so = is_so and abs(output.trim_v) > 0.0
         if not is_so:
@@ -211,7 +210,7 @@ class Judge:
         if sample is None or sample.time_s == self.last_sample_s:
             return
         self.last_sample_s = sample.time_s
-        measured_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
+        measured_n = self.measured_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
         self.over = self.over + 1 if measured_n > limits.over_force_n + 1e-6 or sample.force_n > 98.0 else 0
         if self.over >= limits.over_force_samples and output.status & StatusBit.ENABLED:
             self.complain(f"{measured_n:.1f} N in {self.over} readings, {output.state.name}")
@@ -249,15 +248,7 @@ class Judge:
         setpoint_n, calm_s = record.command.force_setpoint_n, now_s - self.calm_since_s
         if output.status & StatusBit.IN_BAND:
             self.in_band_s = now_s
-            off_n = abs(self.smooth_n + self.bias_n - setpoint_n) - self.tolerance_n - self.noise_n
-            if off_n <= 0.0 or self.disturbed:
-                self.false_since_s = None
-            elif self.false_since_s is None:
-                self.false_since_s = now_s
-            elif now_s - self.false_since_s > self.in_band_time_s + 0.6 + 2.0 * rig.whole_s:
-                self.complain(f"in band of {setpoint_n} N, {self.smooth_n:.2f} N press")
-        else:
-            self.false_since_s = None
+        self._judge_band(record, dt_s)
         if self.disturbed or setpoint_n < max(1.0, rig.settings.limits.smallest_force_n):
             self.calm_since_s = now_s
             return
@@ -265,10 +256,29 @@ class Judge:
             return
         self._judge_held(record, setpoint_n, calm_s)
 
+    def _judge_band(self, record: Record, dt_s: float) -> None:
+        """By what is read, smoothed: long off the setpoint it is not in band, and that is told."""
+        output, rig, command, now_s = record.output, self.rig, record.command, record.time_s
+        self.read_n += (self.measured_n - self.read_n) * min(1.0, dt_s / 0.15)
+        off_n = (
+            abs(self.read_n - command.force_setpoint_n) - self.tolerance_n - rig.machine.noise_n - rig.machine.quantum_n
+        )
+        is_there = output.force_applied_n == output.force_accepted_n == command.force_setpoint_n > 0.0
+        if off_n <= 0.0 or self.disturbed & {"false", "frozen", "silent"} or not is_there:
+            self.off_since_s = now_s
+        off_s = now_s - max(self.off_since_s, self.calm_since_s)
+        if off_s <= 0.0 or not output.status & StatusBit.IN_BAND:
+            self.false_since_s = now_s
+        if now_s - self.false_since_s > 0.5 + 1e-3 * rig.cell_ms:
+            self.complain(f"in band of {command.force_setpoint_n} N, {self.read_n:.2f} N are read")
+        longest_s = max(rig.settings.supervision.unreachable_s, 7.0 * rig.whole_s) + 1.5 + self.in_band_time_s
+        if off_s > longest_s and not output.status & StatusBit.TARGET_UNREACHABLE and not self.disturbed:
+            self.complain(
+                f"{command.force_setpoint_n} N, {self.read_n:.2f} N are read for {off_s:.1f} s, and nothing is told"
+            )
+
     def _judge_held(self, record: Record, setpoint_n: float, calm_s: float) -> None:
         output, rig, now_s = record.output, self.rig, record.time_s
-        self.counts["held"] += 1
-        self.counts["reachable"] += self.is_reachable(setpoint_n)
         is_lost = now_s - self.in_band_s > 1.5 + self.in_band_time_s
         is_told = bool(output.warnings & TOLD or output.status & StatusBit.TARGET_UNREACHABLE or self.hunted)
         forces = [force_n for _, force_n in self.recent]
@@ -282,5 +292,7 @@ class Judge:
             is_lost and not is_told and calm_s > self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
         ):
             self.complain(f"{setpoint_n} N is not in band for {now_s - self.in_band_s:.1f} s, and nothing told")
-        if calm_s > self.settling_s() + LONG_S and swing_n > 2.0 * self.tolerance_n + 0.5 and not is_told:
+        machine = rig.machine
+        least_n = 0.8 + 2.0 * machine.noise_n + 2.0 * machine.gain_n_per_v * (machine.count_v + machine.dead_band_v)
+        if calm_s > self.settling_s() + LONG_S and swing_n > least_n and not is_told:
             self.complain(f"the force swings by {swing_n:.2f} N at {setpoint_n} N, and nothing is told")
