@@ -102,7 +102,7 @@ def draw_machine(draw: Random) -> Machine:
         delay_s=draw.choice((0.005, 0.02, 0.05, 0.1)),
         cell_lag_s=draw.choice((0.004, 0.015, 0.05)),
         quantum_n=quantum_n,
-        noise_n=max(0.3 * quantum_n, draw.choice((0.02, 0.04, 0.1, 0.25))),
+        noise_n=max(0.5 * quantum_n, draw.choice((0.02, 0.04, 0.1, 0.25))),
         count_v=draw.choice((0.0003, 0.0025, 0.01, 0.04)),
         dead_band_v=draw.choice((0.0, 0.0, 0.01, 0.03)),
         slew_v_per_s=draw.choice((1000.0, 1000.0, 60.0, 15.0)),
