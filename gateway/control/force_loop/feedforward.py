@@ -15,7 +15,7 @@ from gateway.bsfm.slip.reversal import Memory
 from gateway.control.demand import Demand
 from gateway.control.force_loop.setpoint_trend import SetpointTrend
 from gateway.control.force_loop.transport_delay import TransportDelay
-from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited
+from gateway.control.limits import TICK_S, RateBudget, is_below_usable, narrow_limits, ramp_limited, trim_limited
 from gateway.control.settings import Limits
 from gateway.registers.words import LimitedBy
 
@@ -102,20 +102,25 @@ class Feedforward:
             least_n = max(0.0, least_n - falling.slope(falling.x0) * falling.x0)
         return max(precontact_n, 2.0 * least_n + APPROACH_N, self._limits.smallest_force_n)
 
-    def use(self, model: Bsfm, gravity_n: float, is_corrected: bool = False) -> None:
-        """Swap the model without a bump: the voltage difference is carried over and fades, with what a correction asks for, if
-        there is one. An equal one changes nothing, for no share says as much as the memory that it would replace."""
+    def use(self, model: Bsfm, gravity_n: float, correction_limit_v: float = 0.0) -> None:
+        """Swap the model without a bump: the voltage difference is carried over and fades, with what a correction may add, 0
+        without one. An equal one changes nothing, for no share says as much as the memory that it would replace."""
         if model == self.model:
             return
-        before_v = self._total_v(gravity_n, is_corrected)
+        before_v = self._total_v(gravity_n, correction_limit_v)
         slide = model.reversal.at(self.model.reversal.branch_share(self._slide))
         self.model, self._slide = model, slide
         self._remember(model.reversal.at(self.branch_share))
         self._limits = narrow_limits(self._rig_limits, model.limits_n)
-        self._carry_over_v += before_v - self._total_v(gravity_n, is_corrected)
+        self._carry_over_v += before_v - self._total_v(gravity_n, correction_limit_v)
 
-    def _total_v(self, gravity_n: float, is_corrected: bool) -> float:
-        return self.compute_voltage(gravity_n)[0] + (self.correction_v(gravity_n) if is_corrected else 0.0)
+    def _total_v(self, gravity_n: float, correction_limit_v: float) -> float:
+        return self.compute_voltage(gravity_n)[0] + trim_limited(self.correction_v(gravity_n), correction_limit_v)[0]
+
+    def replace_volts(self, trim_v: float, correction_n: float, correction_limit_v: float, gravity_n: float) -> None:
+        """Replace what a trim has corrected by volts by a correction in newtons, without a bump: as in `use`."""
+        self.correct(correction_n, gravity_n)
+        self._carry_over_v += trim_v - trim_limited(self.correction_v(gravity_n), correction_limit_v)[0]
 
     def advance(self, goal_n: float, rate_n_per_s: float, dt_s: float, gravity_n: float = 0.0) -> float:
         """Move the applied target towards the goal; returns by how much that moves the slide, N. gravity_n: of the target, what

@@ -64,13 +64,11 @@ class ForceLoop:
         self._timing, self._is_retimed = timing, True
 
     def use(self, model: Bsfm, given_n: float, settings: ControlSettings) -> None:
-        """Swap the calibration and the timing that goes with it. given_n: contact force that the slide need not give.
-
-        The lags' model goes on from where it is, the trim keeps what it has learned.
-        """
+        """Swap the calibration and its timing; the lags' model goes on from where it is, the trim keeps what it
+        has learned. given_n: contact force that the slide need not give."""
         law = self.feedforward
         is_same = model == law.model and settings.timing == self._measured and settings.lead == self._lead_settings
-        law.use(model, given_n, self._is_correcting)
+        law.use(model, given_n, self._correction_limit_v)
         self.expected.retime(settings.supervision.response_lag_s)
         self.settling.retime(settings.supervision.unreachable_s)
         self.expected.use(model)
@@ -83,9 +81,11 @@ class ForceLoop:
         lead, trim, law = self._lead, self._trim, self.feedforward
         self._tune(settings, model)
         self._lead.go_on_from(lead.first_v, lead.second_v)
-        if self._trim is not trim:
-            n_per_v = law.slope_n_per_v(given_n) if isinstance(self._trim, MeasuredTrim) else 1.0
-            self._trim.resume(trim.value_v * n_per_v)
+        if isinstance(self._trim, TrimIntegral):
+            self._trim.resume(trim.value_v)
+        elif self._trim is not trim:
+            self._trim.resume(trim.value_v * law.slope_n_per_v(given_n))
+            law.replace_volts(trim.value_v, self._trim.value_n, self._trim.limit_v, given_n)
         law.retime(*self._course(settings))
 
     def _tune(self, settings: ControlSettings, model: Bsfm) -> None:
@@ -152,8 +152,8 @@ class ForceLoop:
         return self._trim.value_v
 
     @property
-    def _is_correcting(self) -> bool:
-        return isinstance(self._trim, MeasuredTrim) and not self._trim.is_off
+    def _correction_limit_v(self) -> float:
+        return self._trim.limit_v if isinstance(self._trim, MeasuredTrim) else 0.0
 
     @property
     def is_trim_off(self) -> bool:
@@ -186,8 +186,8 @@ class ForceLoop:
         return self.settling.unreachable
 
     def elapse(self, dt_s: float, line: LineStatus) -> None:
-        """Advance the models: dt_s has passed with the present voltage on the output, whoever drives it. The model of the lags
-        hears what the wire has really taken, where that is known: it carries one setting at a time."""
+        """Advance the models: dt_s has passed with the present voltage on the output. The model of the lags hears what the wire
+        has really taken, where that is known."""
         self._limiter.earn(dt_s)
         self._lead.advance(self._limiter.voltage_v if line.sent_v is None else line.sent_v, dt_s)
         if isinstance(self._lead, LinearizedLagInverse):
@@ -260,7 +260,7 @@ class ForceLoop:
             law.begin_at(inputs.reading.contact_n if inputs.touching else 0.0)
         self._learn(inputs, moved_n, given_n)
         model_v, by_model = law.compute_voltage(given_n)
-        if isinstance(self._trim, MeasuredTrim) and self._is_correcting:
+        if isinstance(self._trim, MeasuredTrim) and not self._trim.is_off:
             law.correct(self._trim.value_n, given_n)
             self._trim.take_volts(law.correction_v(given_n))
         has_model = law.applied_n > 0.0 and by_model is not _SMALLEST_FORCE

@@ -81,6 +81,11 @@ class MeasuredTrim:
         return self._settings.gain_v_per_n_s <= 0.0
 
     @property
+    def limit_v(self) -> float:
+        """Largest correction, V; 0 where there is none."""
+        return 0.0 if self.is_off else self._settings.limit_v
+
+    @property
     def has_hunted(self) -> bool:
         """Decide whether the trim has turned round too often."""
         return self._turns >= MOST_TURNS

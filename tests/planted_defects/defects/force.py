@@ -124,4 +124,8 @@ DEFECTS = (
     Defect("slip stops leave the voltage all but open", "bsfm/slip/slip_stops.py",
            "if self.stiffness_per_v * widest_v > STIFFEST:", "if self.stiffness_per_v * widest_v > 1.0:",
            ("bsfm/slip/test_slip_stops.py",)),
+    Defect("a trim that stands at its limit says so only while it asks for more", "control/limits.py",
+           "_NONE if abs(ranged_v) < limit_v or limit_v == 0.0 else LimitedBy.TRIM_RANGE",
+           "_NONE if ranged_v == trim_v else LimitedBy.TRIM_RANGE",
+           ("control/drawn/test_drawn_forces.py",)),
 )  # fmt: skip

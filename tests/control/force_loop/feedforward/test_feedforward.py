@@ -208,7 +208,7 @@ def test_a_swap_to_a_set_that_reverses_otherwise_keeps_the_voltage_beside_a_corr
     law = pressing(20.0)
     law.correct(1.5, 0.0)
     before_v = law.compute_voltage(0.0)[0] + law.correction_v(0.0)
-    law.use(replace(bsfm(1.1), reversal=SlipStops((0.5, 1.0), (0.5, 0.5))), 0.0, is_corrected=True)
+    law.use(replace(bsfm(1.1), reversal=SlipStops((0.5, 1.0), (0.5, 0.5))), 0.0, correction_limit_v=1.0)
     assert law.compute_voltage(0.0)[0] + law.correction_v(0.0) == pytest.approx(before_v)
 
 

@@ -4,12 +4,14 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.control import CalibrationInUse, Controller
 from gateway.control.compensation.compensation import TimingCompensation
 from gateway.control.force_loop.force_loop import ForceLoop
 from gateway.control.sample_conditioning import Reading
 from gateway.registers.words import LimitedBy
-from tests.control.bench import bsfm, settings
+from tests.control.bench import Bench, bsfm, settings
 from tests.control.force_loop.test_force_loop import LINE, inputs, loop_of, pressed, wish
+from tests.control.test_rest_forgets import RESPONSE
 
 
 def step(loop: ForceLoop, force_n: float, contact_n: float, ticks: int = 1, **changes: object) -> ForceLoop:
@@ -77,3 +79,36 @@ def test_an_equal_calibration_leaves_the_course_of_the_force_alone() -> None:
         for loop in (used, left):
             step(loop, 40.0, 5.0)
     assert used.feedforward.reference_n == left.feedforward.reference_n
+
+
+def held(bench: Bench) -> float:
+    """20 N behind a turn, with a trim that has to learn; the voltage."""
+    bench.run(0.1)
+    bench.enable(30.0)
+    bench.run(2.0)
+    bench.force(19.0)
+    bench.run(0.3)
+    bench.force(20.0)
+    return bench.run(2.0).voltage_v
+
+
+@pytest.mark.parametrize("scale", [0.9, 1.1])
+def test_a_trim_at_its_limit_makes_no_bump_of_a_swap(scale: float) -> None:
+    """What it asks for beyond its limit is not on the output."""
+    control = settings()
+    bench = Bench(replace(control, trim=replace(control.trim, limit_v=0.3)), gain_n_per_v=6.4)
+    bench.controller = Controller(bench.settings, CalibrationInUse(bsfm(), 1, RESPONSE))
+    before_v = held(bench)
+    assert bench.last.limited_by is LimitedBy.TRIM_RANGE
+    bench.controller.use(CalibrationInUse(bsfm(scale), 2, RESPONSE))
+    assert bench.step().voltage_v == pytest.approx(before_v, abs=0.02)
+
+
+@pytest.mark.parametrize("gain", [8.0, 8.2])
+def test_the_first_measured_response_takes_over_the_volts_of_the_trim_before(gain: float) -> None:
+    """In newtons the same correction asks for other volts behind a turn, and the inverse of the lags for a multiple of them."""
+    bench = Bench(gain_n_per_v=gain)
+    before_v = held(bench)
+    assert abs(bench.last.trim_v) > 0.1
+    bench.controller.use(CalibrationInUse(bsfm(), 2, RESPONSE))
+    assert bench.step().voltage_v == pytest.approx(before_v, abs=0.02)
