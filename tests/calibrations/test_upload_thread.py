@@ -91,6 +91,7 @@ def test_what_the_disk_does_not_give_is_told_with_its_place(bench: Bench):
 
 
 def test_a_loop_that_ends_before_the_disk_is_ready_leaves_the_old_set_or_the_new_one(bench: Bench):
+    join_disk_threads()  # those of the tests before
     go = threading.Event()
 
     async def begin() -> None:
