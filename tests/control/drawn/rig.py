@@ -43,7 +43,6 @@ class DrawnRig(Bench):
         self.cell_late_ms, self.false_n, self.answers_late = 0, 0.0, False
         self._felt: deque[tuple[int, float]] = deque()
         self.readings: deque[tuple[float, float]] = deque(maxlen=400)
-        self.clearing_zeroes_heartbeat = True
 
     @property
     def whole_s(self) -> float:
