@@ -126,7 +126,10 @@ class JournaledDisk(WatchedDisk):
     # -- what is noted
 
     def _read(self, folder: Path, node: int) -> None:
+        """Links, pipes and sockets are gone behind a power cut."""
         for path in sorted(folder.iterdir()):
+            if path.is_symlink() or not (path.is_dir() or path.is_file()):
+                continue
             self._nodes += 1
             self.begin.folders[node][path.name] = inner = self._nodes
             if path.is_dir():

@@ -221,16 +221,3 @@ class DrawnDisk(JournaledDisk):
         if number:
             self.refused.append(call)
             raise OSError(number, os.strerror(number), *([] if call.descriptor >= 0 else [call.path]))
-
-    def _read(self, folder: Path, node: int) -> None:
-        """Links, pipes and sockets are gone behind a power cut."""
-        for path in sorted(folder.iterdir()):
-            if path.is_symlink() or not (path.is_dir() or path.is_file()):
-                continue
-            self._nodes += 1
-            self.begin.folders[node][path.name] = inner = self._nodes
-            if path.is_dir():
-                self.begin.folders[inner] = {}
-                self._read(path, inner)
-            else:
-                self.begin.files[inner] = path.read_bytes()

@@ -3,8 +3,6 @@
 import contextlib
 from pathlib import Path
 
-import pytest
-
 from gateway.recording import Recorder, recording_paths
 from gateway.recording.care.keeping import delete_recording
 from gateway.service.running_rig.recording.recordings import Recordings
@@ -14,22 +12,9 @@ from tests.disk.failing_disks import FailingDisk
 from tests.disk.watched_disk import watching
 from tests.service.kept_log import Log
 from tests.service.rigs import demo
-from tests.service.running_rig.recording.test_run_recording import HangingDisk, rows_until
+from tests.service.running_rig.recording.test_run_recording import HangingDisk, disk, log, recordings, rows_until
 
-
-@pytest.fixture
-def disk() -> HangingDisk:
-    return HangingDisk()
-
-
-@pytest.fixture
-def log() -> Log:
-    return Log()
-
-
-@pytest.fixture
-def recordings(tmp_path: Path, disk: HangingDisk, log: Log) -> Recordings:
-    return Recordings(tmp_path / "recordings", demo(), log, disk)  # type: ignore[arg-type]
+__all__ = ["disk", "log", "recordings"]
 
 
 def test_a_recording_whose_file_a_disk_that_hung_never_made_is_refused_and_begins_by_itself_no_more(
