@@ -80,6 +80,8 @@ class Lease:
         """Let no beat of before count of the master that has the lease, nor of any other that has beaten within one length:
         this one has switched the output off. Its own count for one length, as long as a cycle may bring the next frame: of two
         programs on one host that hung one may write 0, and the other 1."""
+        if self._master not in (who, *self._beats):  # it has never beaten, and would begin again by what stands
+            keep_latest(self._beats, self._master, (self._heartbeat, nan))
         for other, (heartbeat, beaten_s) in self._beats.items():
             if other != who and (other == self._master or self.is_within(beaten_s, now_s)):
                 self._beats[other] = heartbeat, nan

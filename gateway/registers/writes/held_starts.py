@@ -221,7 +221,9 @@ class HeldEnables:
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
-        self._refused[host] = refused._replace(at_s=now_s)
+        alike = [channel for channel, other in refused.sent.items() if other.data == frame.data]  # of a pool
+        stands = dict.fromkeys((*alike, frame.channel), _Sent(frame.data, self.frames.moves_so_far))
+        self._refused[host] = refused._replace(at_s=now_s, sent={**refused.sent, **stands})
         return True
 
     def knows(self, host: str) -> bool:
@@ -243,6 +245,7 @@ class HeldEnables:
         self._look_for(host, heartbeat, channel)
         if not self.frames.note(channel, heartbeat) and (refused := self._refused.get(host)):
             self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
+            self.note_lost(host, heartbeat)
 
     def _is_there(self, host: str, heartbeat: int, channel: Channel) -> bool:
         """Whether the program of a lost master goes on: a heartbeat that only goes to and fro may have been in one of its

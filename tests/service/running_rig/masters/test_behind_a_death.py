@@ -222,3 +222,25 @@ def test_behind_a_death_on_the_heels_of_a_fault_no_frame_presses_of_a_program_th
         assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     rig.write(0, *HUNG[:4], 140)
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("ends", ["dies", "ends"])
+def test_behind_a_death_nothing_begins_that_was_refused_and_whose_heartbeat_has_come_again(ends: str) -> None:
+    """The word comes without a heartbeat. Behind its first refusal the heartbeat had moved, and behind the second one it stood:
+    the next process knew of none."""
+    kept: dict[str, Any] = {}
+    answers: list[Refusal | None] = []
+    for process in range(2):
+        rig = SmallRig(settings(lease_s=LEASE_S))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.is_cell_silent, rig.beats = not process, False
+        if not process:
+            rig.write(1, 0, 0, 0, 6, peer=OTHER)
+        rig.run(0.5)
+        for _ in range(2):
+            answers.append(rig.answer(0, ENABLE, peer=OTHER))
+            rig.answer(1, 1200, 0, 0, 7, peer=OTHER)
+            rig.run(0.5)
+        for fact in kept.keys() - left_of(kept).keys() if ends == "ends" else ():
+            del kept[fact]
+    assert answers[0] and answers[2] and answers[2].reason is RefusalReason.HEARTBEAT_STALE
