@@ -152,7 +152,7 @@ DEFECTS = (
     Defect("who writes enable as 0 is held to what was refused", "registers/writes/held_starts.py",
            "refused._replace(is_let_go=True)", "refused", ("registers/test_held_starts.py",)),
     Defect("a 0 of somebody beside a hung program lets its frame begin", "registers/writes/held_starts.py",
-           "self._refused[host] = refused._replace(is_let_go=True)", "del self._refused[host]",
+           "self._refused[host, False] = refused._replace(is_let_go=True)", "del self._refused[host, False]",
            ("registers/test_held_starts.py",)),
     Defect("behind such a 0 one of its frames alone is known", "registers/writes/held_starts.py",
            "sent = {**(before.sent if before else {}), frame.channel:", "sent = {frame.channel:",

@@ -75,7 +75,7 @@ class Cell:
 def _forget_others(rig: SmallRig) -> None:
     """No other cell's write was before this one."""
     rig.bank.held_enables.let_go(OWNER.identity, rig.now())
-    rig.bank._admission._last_tares.by_host.clear()
+    rig.bank.held_enables._refused.clear()
 
 
 def cells(stands_n: float) -> Iterator[Cell]:
