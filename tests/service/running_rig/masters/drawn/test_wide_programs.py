@@ -86,3 +86,17 @@ def test_behind_a_stop_of_another_one_nothing_begins_that_has_never_beaten() -> 
     assert answers[0] and answers[0].reason is RefusalReason.HEARTBEAT_STALE and rig.state is State.OFF
     rig.write(1, 300, 0, 0, 1, peer=OTHER)
     assert rig.answer(0, ENABLE, peer=OTHER) is None, "its program goes on"
+
+
+def test_behind_the_0_of_another_program_on_its_host_nothing_begins_whose_heartbeat_has_stood_since_the_start() -> None:
+    """Behind a power cut, say: it brought what stood in the register, had no beat that could be too old, and began each time."""
+    rig, twin = begun(), Peer(OTHER.host, OTHER.port + 1)
+    answers = []
+    for _ in range(5):
+        answers.append(rig.answer(0, ENABLE, peer=OTHER))
+        rig.answer(1, 300, 0, 0, 0, peer=OTHER)
+        rig.run(0.05).write(0, 0, peer=twin)
+        rig.run(0.05)
+    assert answers[0] is None and all(answers[1:]), answers
+    rig.write(1, 300, 0, 0, 1, peer=OTHER)
+    assert rig.answer(0, ENABLE, peer=OTHER) is None, "its program goes on"
