@@ -89,7 +89,7 @@ def test_behind_a_stop_of_another_one_nothing_begins_that_has_never_beaten() -> 
 
 
 def test_behind_the_0_of_another_program_on_its_host_nothing_begins_whose_heartbeat_has_stood_since_the_start() -> None:
-    """Behind a power cut, say: it brought what stood in the register, had no beat that could be too old, and began each time."""
+    """Behind a power cut, say: it brought what stood in the register, had no beat to be too old, and began each time."""
     rig, twin = begun(), Peer(OTHER.host, OTHER.port + 1)
     answers = []
     for _ in range(5):
