@@ -225,7 +225,7 @@ class HeldEnables:
         if (refused := self._refused.get(key)) is None or not self._is_same(host, refused, frame):
             return False
         is_by_hand = refused.is_let_go or (frame.tares and frame.heartbeat is None)
-        if now_s - refused.at_s >= (LONGEST_CYCLE_S if is_by_hand else _HELD_S):
+        if now_s - refused.at_s >= (LONGEST_CYCLE_S if is_by_hand else inf if frame.tares else _HELD_S):
             del self._refused[key]
             self._miss_no_more(host)
             return False

@@ -100,3 +100,10 @@ def test_behind_the_0_of_another_program_on_its_host_nothing_begins_whose_heartb
     assert answers[0] is None and all(answers[1:]), answers
     rig.write(1, 300, 0, 0, 1, peer=OTHER)
     assert rig.answer(0, ENABLE, peer=OTHER) is None, "its program goes on"
+
+
+def test_a_tare_with_the_heartbeat_of_the_last_one_is_refused_however_late_it_comes() -> None:
+    rig = begun()
+    assert rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER) is None
+    refused = rig.run(5.0).answer(0, TARE, 0, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
