@@ -78,15 +78,15 @@ def test_a_run_that_was_refused_over_a_fault_holds_up_no_enable_behind_its_reset
             assert bank.command.control_word == ENABLE
 
 
-def test_a_start_that_was_refused_counts_again_behind_a_heartbeat_that_came_with_a_refused_tare(make_bank, master_of):
+def test_a_start_that_was_refused_counts_again_behind_a_heartbeat_that_came_with_a_refused_reset(make_bank, master_of):
     bank = make_bank(has_lease=True)
     master = master_of(bank, "10.0.0.1")
     master.write(4, 1)
     bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
     assert master.refusal(master.write, 0, int(ENABLE)).reason is RefusalReason.NOT_READY
-    bank.on_asked = _refuse(TARE, RefusalReason.TARE_REFUSED)
+    bank.on_asked = _refuse(ControlBit.RESET_FAULT, RefusalReason.RESET_NEEDS_ZERO)
     for beat in (2, 3):
-        assert master.refusal(master.write, 0, TARE, 0, 0, 0, beat).reason is RefusalReason.TARE_REFUSED
+        assert master.refusal(master.write, 0, ControlBit.RESET_FAULT, 0, 0, 0, beat)
     bank.on_asked = lambda write: None
     master.write(0, int(ENABLE))
     assert not bank.command.repeats

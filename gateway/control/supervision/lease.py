@@ -24,7 +24,7 @@ class Lease:
         self._changed_s = self._moved_s = self._heard_s = -inf  # heard: in what was refused
         self._beats: dict[str, tuple[int, float]] = {}  # of each master its last, and when it came; nan: counts no more
         self._started_s = -inf
-        self._frames, self._refused = FrameBeats(), FrameBeats()
+        self._frames = FrameBeats()
         self._master = ""  # who has the lease
         self._stopped_s: dict[str, float] = {}  # when each master has switched the output off last
         self._unbeaten: dict[str, None] = {}  # who has taken over, and not beaten since
@@ -54,12 +54,11 @@ class Lease:
 
     def hear_refused(self, now_s: float, heartbeat: int, who: str, channel: Channel) -> None:
         """Note the heartbeat of a write that was refused: it renews nothing, but where it changes its program goes on."""
-        frames = self._frames if self._frames.knows_alike(channel) else self._refused
-        if frames.moves(channel, heartbeat):
+        if self._frames.moves(channel, heartbeat):
             keep_latest(self._beats, who, (heartbeat, now_s))
             self._unbeaten.pop(who, None)
             self._heard_s = now_s
-        frames.put(channel, heartbeat)
+        self._frames.put(channel, heartbeat)
 
     def beats_of(self, who: str | None) -> list[int]:
         """Return the heartbeats that stand in the latest frames of this master."""
@@ -80,6 +79,8 @@ class Lease:
         """Let no beat of before count of the master that has the lease, nor of any other that has beaten within one length:
         this one has switched the output off. Its own count for one length, as long as a cycle may bring the next frame: of two
         programs on one host that hung one may write 0, and the other 1."""
+        if self._master not in (who, *self._beats):  # it has never beaten, and would begin again by what stands
+            keep_latest(self._beats, self._master, (self._heartbeat, nan))
         for other, (heartbeat, beaten_s) in self._beats.items():
             if other != who and (other == self._master or self.is_within(beaten_s, now_s)):
                 self._beats[other] = heartbeat, nan
@@ -132,9 +133,10 @@ class Lease:
         observed now; always true without a lease."""
         if self._length_s is None or self._is_beat(heartbeat, who, channel):
             return True
-        if who not in self._beats:
-            return self._changed_s >= since_s
-        beaten_s, is_stopped = self._beats[who][1], now_s - self._stopped_s.get(who, -inf) < LONGEST_CYCLE_S
+        is_stopped = now_s - self._stopped_s.get(who, -inf) < LONGEST_CYCLE_S
+        if who not in self._beats:  # a person, or a program whose heartbeat stands since the start
+            return self._changed_s >= since_s and not (is_stopped and self._frames.of(who))
+        beaten_s = self._beats[who][1]
         return beaten_s >= since_s and (self.is_within(beaten_s, now_s) or not is_stopped)
 
     def would_be_fresh_since(self, since_s: float, now_s: float, heartbeat: int) -> bool:

@@ -32,7 +32,6 @@ from gateway.registers.writes.command_block import (
     Values,
 )
 from gateway.registers.writes.held_starts import HeldEnables, HeldRuns, StartFrame
-from gateway.registers.writes.last_tares import LastTares
 from gateway.registers.writes.left_setpoints import without_left_setpoints
 from gateway.registers.writes.ownership import Ownership
 from gateway.registers.writes.proposed_write import Decide, ProposedWrite, decide_nothing
@@ -56,7 +55,6 @@ class Admission:
         self.note_state(State.OFF, Status)
         self.lowered_from_n = 0.0
         self.held_runs, self.held_enables = HeldRuns(), HeldEnables(has_lease=rules.has_lease)
-        self._last_tares = LastTares(self.held_enables.frames, has_lease=rules.has_lease)
         self._commands = commands
         self._ownership = ownership
         self._echo = echo
@@ -101,7 +99,7 @@ class Admission:
             command = command._replace(stops=True)
         elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
             command = command._replace(lowered_from_n=self.lowered_from_n)
-        frame = self._frame(write, values, written)
+        frame = self._frame(write, int(values[HEARTBEAT]), written)
         repeats = not self._is_in_use(write.host) and self.held_enables.repeats(write.host, frame, now_s)
         command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
         self._ask(command, permitted.values, write)
@@ -132,7 +130,7 @@ class Admission:
 
     def is_usual(self, host: str) -> bool:
         """Return whether nothing makes a host's writes special: no bit that it held, no lowered setpoint, no run."""
-        is_held = host in self.held_runs.by_host or self.held_enables.knows(host) or self._last_tares.knows(host)
+        is_held = host in self.held_runs.by_host or self.held_enables.knows(host)
         return not (self.lowered_from_n or self.is_calibrating or is_held)
 
     # -- what the write asks for
@@ -203,9 +201,9 @@ class Admission:
         """Whether the output is this host's: it begins nothing then, and a beat that came with what was refused is one."""
         return self._ownership.owner == host and bool(int(self._commands.values[CONTROL_WORD]) & STARTS)
 
-    def _frame(self, write: Write, values: Values, word: int) -> StartFrame:
-        beat = int(values[HEARTBEAT]) if HEARTBEAT in self._offsets(write) else None
-        return StartFrame(_channel(write), (write.address, write.data), beat, bool(word & TAKE))
+    def _frame(self, write: Write, heartbeat: int, word: int, *, tares: bool = False) -> StartFrame:
+        beat = heartbeat if HEARTBEAT in self._offsets(write) else None
+        return StartFrame(_channel(write), (write.address, write.data), beat, bool(word & TAKE), tares)
 
     def _note_refused(self, write: Write, reason: RefusalReason, now_s: float) -> None:
         """What was refused once, and is sent on and on, begins nothing later. A value that is refused today another calibration
@@ -219,7 +217,7 @@ class Admission:
         with suppress(Refusal):
             values = self._commands.decode(write.block, write.address, write.data)
             word = int(values[CONTROL_WORD]) if asks else 0
-            frame, asks = self._frame(write, values, word), bool(word & (STARTS | TAKE))
+            frame, asks = self._frame(write, int(values[HEARTBEAT]), word), bool(word & (STARTS | TAKE))
         if frame.heartbeat is not None and not write.peer.is_behind:
             self.held_enables.on_refused_beat(now_s, frame.heartbeat, write.host, frame.channel)
         if reason is RefusalReason.NOT_OWNER and CONTROL_WORD in offsets:
@@ -231,7 +229,7 @@ class Admission:
         elif frame.heartbeat is not None:
             self.held_enables.note_refused_beat(write.host, frame)
         if reason is RefusalReason.TARE_REFUSED:
-            self._note_tare(write.host, frame.channel, standing if frame.heartbeat is None else frame.heartbeat, now_s)
+            self.held_enables.note_refused(write.host, frame._replace(tares=True), standing, now_s)
 
     def _hear(self, write: Write, asked: int, heartbeat: int, now_s: float) -> None:
         if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
@@ -244,9 +242,9 @@ class Admission:
         if is_known and zeros & ENABLE:
             enables.let_go(write.host, now_s)
         if asked & TARE:
-            self._note_tare(write.host, _channel(write), heartbeat, now_s)
-        elif zeros & TARE and write.host in self._last_tares.by_host:
-            self._last_tares.let_go(write.host)
+            enables.note_refused(write.host, self._frame(write, heartbeat, asked, tares=True), heartbeat, now_s)
+        elif zeros & TARE:
+            enables.let_go_tare(write.host)
 
     # -- why not
 
@@ -278,19 +276,11 @@ class Admission:
         text = f"{self._ownership.owner} owns the setpoint, {host} may read and clear enable: {cure}"
         return Refusal(RefusalReason.NOT_OWNER, address, text)
 
-    def _note_tare(self, host: str, channel: Channel, heartbeat: int, now_s: float) -> None:
-        """By the same frame of a program that hangs the next process takes no tare either."""
-        self._last_tares.note(host, channel, now_s)
-        if self.held_enables.has_beaten(host):
-            self.held_enables.note_lost(host, heartbeat)
-
     def _check_tare(self, command: Command, word_at: int, frame: StartFrame) -> None:
-        host, beat, now_s = command.peer, command.heartbeat, command.received_s
         if not int(command.control_word) & TARE:
             return
-        if self._last_tares.repeats(host, frame, now_s):
-            self._note_tare(host, frame.channel, beat, now_s)
-            text = f"tare refused: heartbeat = {beat} as at its last one: write another value with it"
+        if self.held_enables.repeats(command.peer, frame._replace(tares=True), command.received_s):
+            text = f"tare refused: heartbeat = {command.heartbeat} as at its last one: write another value with it"
             raise Refusal(RefusalReason.HEARTBEAT_STALE, word_at, text, value=float(command.control_word))
 
     def _check_starts(self, command: Command, word_at: int) -> None:

@@ -3,7 +3,9 @@
 They outlive the process: by a control that was started anew the holder's next cycle would begin another run, or press over a
 fault that was latched, and that nobody has reset. An enable that is written on and on over a latched fault would press by
 another master's reset alone, too: a reset begins nothing. And a start that was refused, for whatever reason, and comes on and
-on with the same heartbeat would begin when that reason is over, whatever its other frames bring, as long as they stand still.
+on with the same heartbeat would begin when that reason is over, whatever its other frames bring, as long as they stand still;
+a tare would take whatever lies on the tool by then for the zero. One rule for both: what a frame asks for counts again once a
+heartbeat of its host has moved since that frame has come last, or behind its host's own 0 and a cycle.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -45,12 +47,14 @@ class HeldRuns:
 
 
 class StartFrame(NamedTuple):
-    """A write, by what tells it from the one before. heartbeat: None where it brings none; takes: it takes over."""
+    """A write, by what tells it from the one before. heartbeat: None where it brings none; takes: it takes over; tares: it
+    is looked at as a tare, which counts beside all other starts of its host."""
 
     channel: Channel
     data: tuple[int, bytes]  # where, and what
     heartbeat: int | None = None
     takes: bool = False
+    tares: bool = False
 
 
 class _Sent(NamedTuple):
@@ -105,7 +109,9 @@ class HeldEnables:
         self._lost_now: dict[str, list[int]] = {}
         self._let_go_s: dict[str, float] = {}  # when somebody on the host of one of the lost has written enable as 0
         self.frames = FrameBeats()
-        self._refused: dict[str, _Refused] = {}  # of each host the start that was refused last
+        self._refused: dict[
+            tuple[str, bool], _Refused
+        ] = {}  # of each host the start refused last; its last tare, if True
         self._told_s = 0.0
         self._ahead: Command | None = None  # whose heartbeat is noted later
         self._is_moving = False  # it was another one than in the command before
@@ -133,11 +139,11 @@ class HeldEnables:
             self.on_lost(dict(self._lost_now))
 
     def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:
-        """Note a write that was refused: the same one, on and on, is of a program that may stand still. standing: the heartbeat
-        that stands."""
+        """Note a write that was refused, or has tared: the same one, on and on, is of a program that may stand still.
+        standing: the heartbeat that stands."""
         if not self._has_lease:
             return
-        before = self._refused.pop(host, None)
+        before = self._refused.pop((host, frame.tares), None)
         if before and self._stands(host, frame, before.moves):
             frame = frame._replace(takes=frame.takes or before.frame.takes)  # one of its frames does
             if before.beats:
@@ -149,7 +155,9 @@ class HeldEnables:
         sent = {**(before.sent if before else {}), frame.channel: _Sent(frame.data, moves)}
         few = dict(list(sent.items())[-defaults.MOST_FRAMES :])
         beats = beats or bool(before and before.beats)
-        keep_latest(self._refused, host, _Refused(frame, known, beats, now_s, few, moves))
+        keep_latest(self._refused, (host, frame.tares), _Refused(frame, known, beats, now_s, few, moves))
+        if frame.tares and self.has_beaten(host):
+            self.note_lost(host, known)
 
     def _is_same(self, host: str, refused: _Refused, frame: StartFrame) -> bool:
         """Whether a frame brings nothing new, beside what was refused last or behind itself: no heartbeat of its host has moved
@@ -202,8 +210,8 @@ class HeldEnables:
         self._look_for(host, frame.heartbeat, frame.channel)
         is_new = not self.frames.has_brought(frame.channel, frame.heartbeat)
         self.frames.note(frame.channel, frame.heartbeat)
-        if is_new and (refused := self._refused.get(host)):
-            self._refused[host] = refused._replace(heartbeat=frame.heartbeat, beats=True)
+        if is_new and (refused := self._refused.get((host, False))):
+            self._refused[host, False] = refused._replace(heartbeat=frame.heartbeat, beats=True)
 
     def repeats(self, host: str, frame: StartFrame, now_s: float) -> bool:
         """Decide whether a write brings no other heartbeat than the one with which its host was lost in the process before, or
@@ -213,22 +221,29 @@ class HeldEnables:
             if now_s - self._let_go_s.get(host, inf) < LONGEST_CYCLE_S:
                 return True
             self._find(host)
-        if (refused := self._refused.get(host)) is None or not self._is_same(host, refused, frame):
+        key = host, frame.tares
+        if (refused := self._refused.get(key)) is None or not self._is_same(host, refused, frame):
             return False
-        if now_s - refused.at_s >= (LONGEST_CYCLE_S if refused.is_let_go else _HELD_S):
-            del self._refused[host]
+        is_by_hand = refused.is_let_go or (frame.tares and frame.heartbeat is None)
+        if now_s - refused.at_s >= (LONGEST_CYCLE_S if is_by_hand else inf if frame.tares else _HELD_S):
+            del self._refused[key]
             self._miss_no_more(host)
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
-        self._refused[host] = refused._replace(at_s=now_s)
+        alike = [channel for channel, other in refused.sent.items() if other.data == frame.data]  # of a pool
+        stands = dict.fromkeys((*alike, frame.channel), _Sent(frame.data, self.frames.moves_so_far))
+        self._refused[key] = refused._replace(at_s=now_s, sent={**refused.sent, **stands})
         return True
 
     def knows(self, host: str) -> bool:
         """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
         if host in self.by_host or host in self.lost or host in self._lost_now:
             return True
-        return host in self._refused and not self.frames.has_moved_since(self._refused[host].moves, host)
+        if not self._refused:
+            return False
+        asked = (self._refused.get((host, tares)) for tares in (False, True))
+        return any(one is not None and not self.frames.has_moved_since(one.moves, host) for one in asked)
 
     def holds(self, host: str, now_s: float) -> bool:
         """Decide whether a 1 of this host is one that it has kept up since the fault. If so, it goes on being kept up."""
@@ -241,8 +256,11 @@ class HeldEnables:
     def hear(self, host: str, heartbeat: int, channel: Channel) -> None:
         """Note what a host has written as its heartbeat: where it is another one than when it was lost, its program goes on."""
         self._look_for(host, heartbeat, channel)
-        if not self.frames.note(channel, heartbeat) and (refused := self._refused.get(host)):
-            self._refused[host] = refused._replace(heartbeat=heartbeat, beats=True)
+        stands = not self.frames.note(channel, heartbeat)
+        for key in ((host, False), (host, True)) if stands and self._refused else ():
+            if refused := self._refused.get(key):
+                self._refused[key] = refused._replace(heartbeat=heartbeat, beats=True)
+                self.note_lost(host, heartbeat)
 
     def _is_there(self, host: str, heartbeat: int, channel: Channel) -> bool:
         """Whether the program of a lost master goes on: a heartbeat that only goes to and fro may have been in one of its
@@ -264,10 +282,15 @@ class HeldEnables:
         if host in self.lost:
             self._let_go_s[host] = now_s
         self._forget(host)
-        if refused := self._refused.get(host):
-            self._refused[host] = refused._replace(is_let_go=True)
+        if refused := self._refused.get((host, False)):
+            self._refused[host, False] = refused._replace(is_let_go=True)
         if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
             self._miss_no_more(host)
+
+    def let_go_tare(self, host: str) -> None:
+        """Note that a host has written the bit of a tare as 0."""
+        if tared := self._refused.get((host, True)):
+            self._refused[host, True] = tared._replace(is_let_go=True)
 
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""

@@ -56,9 +56,11 @@ class Handover:
         bank.held_enables.on_change = lambda held: keep(held_enables=held)
         bank.held_runs.restore(self._kept.get("held_runs", {}))
         held, lost, owner = (self._kept.get(name) for name in ("held_enables", "lost_beats", "owner"))
-        last = {owner: left_beats} if owner is not None and left_beats is not None else {}
+        lost = dict(lost or {})
+        if owner is not None and left_beats is not None:  # of another program on its host the one before may have told
+            lost[owner] = [*lost.get(owner, ()), *left_beats]
         keep(owner=None)
-        bank.held_enables.restore(held or {}, {**(lost or {}), **last}, now_s)
+        bank.held_enables.restore(held or {}, lost, now_s)
 
     def recording(self, now_s: float) -> WantedRecording | None:
         """Return what is to be recorded; None: nothing, or its time is over by now_s (monotonic)."""

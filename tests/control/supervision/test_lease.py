@@ -1,5 +1,7 @@
 """A lease by itself: what renews it, when it is over, and what counts as a sign of life since a time."""
 
+from math import inf
+
 import pytest
 
 from gateway.codes.faults import FaultCode
@@ -149,3 +151,14 @@ def test_a_master_s_last_heartbeat_is_none_once_more_in_a_frame_that_comes_for_t
     lease.observe(10.2, 4711, *block_of("page"))
     lease.observe(10.4, 7, "plc", ("plc", "plc", 4001, 4, 2))
     assert lease.age_s(11.0) == pytest.approx(0.8)
+
+
+def test_a_heartbeat_that_toggles_in_a_frame_that_was_only_refused_so_far_is_a_beat() -> None:
+    """Its other value stood, by another frame of its program: it was told that it stands still, for good."""
+    lease, block = Lease(0.35), ("plc", "10.0.0.5", 4001, 0, 10)
+    lease.hear_refused(1.0, 1, "plc", block)
+    lease.observe(1.1, 0, "plc", ("plc", "10.0.0.5", 4001, 4, 2))
+    lease.start(1.12, "plc")
+    lease.stop(1.15, "page")
+    assert not lease.would_have_beaten_since(-inf, 1.2, 1, "plc", block)
+    assert lease.would_have_beaten_since(-inf, 1.2, 0, "plc", block)

@@ -8,6 +8,7 @@ from typing import Final
 from gateway.modbus import ModbusError
 from gateway.registers import Refusal
 from gateway.registers.writes.admission import Write
+from gateway.registers.writes.frame_beats import FrameBeats
 from tests.service.edge_table.rules import Asked
 from tests.service.running_rig.simulated_rig import OWNER, SmallRig
 
@@ -75,7 +76,8 @@ class Cell:
 def _forget_others(rig: SmallRig) -> None:
     """No other cell's write was before this one."""
     rig.bank.held_enables.let_go(OWNER.identity, rig.now())
-    rig.bank._admission._last_tares.by_host.clear()
+    rig.bank.held_enables._refused.clear()
+    rig.controller._commands._lease._frames = FrameBeats()  # a heartbeat that was refused is no new one behind that
 
 
 def cells(stands_n: float) -> Iterator[Cell]:

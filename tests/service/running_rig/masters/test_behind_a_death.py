@@ -7,12 +7,13 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
+from gateway.modbus import Peer
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover, left_of
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, TARE, SmallRig
 
 HUNG = (ENABLE, 3000, 0, 0, 139)
 
@@ -222,3 +223,51 @@ def test_behind_a_death_on_the_heels_of_a_fault_no_frame_presses_of_a_program_th
         assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     rig.write(0, *HUNG[:4], 140)
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("ends", ["dies", "ends"])
+def test_behind_a_death_nothing_begins_that_was_refused_and_whose_heartbeat_has_come_again(ends: str) -> None:
+    """The word comes without a heartbeat. Behind its first refusal the heartbeat had moved, and behind the second one it stood:
+    the next process knew of none."""
+    kept: dict[str, Any] = {}
+    answers: list[Refusal | None] = []
+    for process in range(2):
+        rig = SmallRig(settings(lease_s=LEASE_S))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        rig.is_cell_silent, rig.beats = not process, False
+        if not process:
+            rig.write(1, 0, 0, 0, 6, peer=OTHER)
+        rig.run(0.5)
+        for _ in range(2):
+            answers.append(rig.answer(0, ENABLE, peer=OTHER))
+            rig.answer(1, 1200, 0, 0, 7, peer=OTHER)
+            rig.run(0.5)
+        for fact in kept.keys() - left_of(kept).keys() if ends == "ends" else ():
+            del kept[fact]
+    assert answers[0] and answers[2] and answers[2].reason is RefusalReason.HEARTBEAT_STALE
+
+
+def test_behind_a_death_the_owner_s_heartbeats_are_told_beside_those_with_which_its_host_was_lost_before() -> None:
+    """Two programs on it had hung, and one of them owned by its setpoint: the other one began."""
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    hand = Handover({"lost_beats": {OTHER.host: [139]}, "owner": OTHER.host}, record=False)
+    hand.restore_held(rig.bank, rig.now(), lambda **facts: None, [7])
+    for port, beat in ((4002, 7), (4003, 139)):
+        refused = rig.answer(0, ENABLE, 1200, 0, 0, beat, peer=Peer(OTHER.host, port))
+        assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+def test_the_tare_of_a_program_that_hung_before_its_heartbeat_could_move_is_taken_by_no_process_behind_it() -> None:
+    """Its word came before its first heartbeat, and a first one proves nothing: each process tared once more."""
+    kept: dict[str, Any] = {}
+
+    def begun() -> SmallRig:
+        rig = SmallRig(settings(lease_s=LEASE_S))
+        Handover(dict(kept), record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+        return rig.run(0.5)
+
+    rig = begun()
+    assert rig.answer(0, TARE, peer=OTHER) is None
+    rig.write(4, 0, peer=OTHER)
+    refused = begun().answer(0, TARE, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE

@@ -35,7 +35,7 @@ class Laws:
     def __init__(self) -> None:
         self.programs: list[Program] = []
         self.told: list[str] = []
-        self.moved_s: dict[str, float] = {}  # by something that was meant just then, not by a frame that flows
+        self.moved_s: dict[str, float] = {}  # by a heartbeat that came for the first time, not by a frame that flows
         self.begun_s: dict[str, float] = {}
         self.excused: dict[str, float] = {}  # until when the frames of a host may begin, for nobody knows who had hung
         self.tared: set[tuple[str, tuple[str, int]]] = set()  # of which host, by which connection of a pool
@@ -64,7 +64,7 @@ class Laws:
         asks = program.asks
         if asks is None:
             return
-        if round(program.moved_s / TICK_S) == rig.ticks:
+        if program.note_beat(frame):
             self.meant(host)
         state, owner, accepted = rig.loop.decision.state, rig.bank.owner, rig.loop.decision.force_accepted_n
         self.writes += 1
@@ -112,7 +112,8 @@ class Laws:
                 assert not (tares and (host, way) in self.tared), f"hung tares again: {about}"
         if tares:
             self.tared.add((host, way))
-        if program.is_live and program.period <= self.longest_period() and program.cycles > 1:
+        is_alone = not any(p.is_mistaken_for(program) for p in self.programs if p is not program and p.identity == host)
+        if program.is_live and program.period <= self.longest_period() and program.cycles > 1 and is_alone:
             assert program.stale <= MOST_STALE, f"honest is told stale: {about}"
             assert program.held <= 2, f"honest is told held: {about}"
 

@@ -127,13 +127,14 @@ class Program:
         self.period = draw.choice((2, 3, 5, 5, 10, 10, 20, 50))
         self._due, self._gap, self._at, self._next = draw.randrange(self.period), draw.choice((0, 0, 1)), WAITING, 0
         self._counts, self._beat = host in CERTIFICATES or draw.random() < 0.7, draw.randrange(1, 65000)
+        self._sent_beat = self._beat
         self._connects = draw.choice(("once", "once", "each frame", "each cycle", "now and then"))
         if not self._counts:
             self._connects = "once"  # behind a restart nobody can tell it from two that hung
         self._port = 5000 + 1000 * place
         if is_serial(host):
             self._connects, self._port = "once", 0
-        self.is_live, self.moved_s, self.pools = True, -99.0, False
+        self.is_live, self.pools = True, False
         self.wants: tuple[int, int] | None = None
         self.asks: tuple[int, int] | None = None
         self._rests = draw.choice((None, ZEROS))
@@ -162,6 +163,11 @@ class Program:
         shared = set(self.frames) & set(other.frames) - {WORD, FORCE}
         return bool(shared)
 
+    def is_mistaken_for(self, other: "Program") -> bool:
+        """Whether words of the two, on one host, are told apart by nothing, for a connection is new."""
+        is_lasting = self._connects == other._connects == "once"
+        return not is_lasting and bool(set(self.frames) & set(other.frames) & {WORD, FORCE})
+
     @property
     def identity(self) -> str:
         return f"certificate {self._host}" if self._host in CERTIFICATES else self._host
@@ -174,11 +180,18 @@ class Program:
             return Peer(self._draw.choice(CERTIFICATES[self._host]), port, name=self._host)
         return Peer(self._host, port)
 
+    def note_beat(self, frame: Frame) -> bool:
+        """Note what a frame brings; return whether its heartbeat comes for the first time: it may have moved before."""
+        is_new = frame not in SILENT and self._beat != self._sent_beat
+        if is_new:
+            self._sent_beat = self._beat
+        return is_new
+
     def due(self, tick: int) -> list[Frame]:
         """Return the frames that are sent at this tick."""
         if self._at == WAITING and tick >= self._due:
             self._due, self._at, self._next = tick + self.period, 0, tick
-            self._begin(tick / 100)
+            self._begin()
         if self.asks is None:
             self._at = WAITING
         if self._at == WAITING or tick < self._next:
@@ -190,7 +203,7 @@ class Program:
             self._at = WAITING
         return list(frames)
 
-    def _begin(self, now_s: float) -> None:
+    def _begin(self) -> None:
         self._port += self._connects == "each cycle"
         if not self.is_live:
             return
@@ -202,7 +215,6 @@ class Program:
         if before and before != self.asks and self.asks is None:
             self.asks = ZEROS  # once, before it rests
         if self.asks:
-            self.moved_s = now_s
             self._beat = (self._beat + 1) % 65536 if self._counts else 1 - min(self._beat, 1)
 
     def _obeyed(self, before: tuple[int, int] | None, refused: list[RefusalReason]) -> tuple[int, int] | None:

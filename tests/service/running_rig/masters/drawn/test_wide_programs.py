@@ -2,12 +2,13 @@
 
 import pytest
 
+from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.words import State
 from tests.service.running_rig.masters.drawn.laws import LEASE_S
 from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, TARE
 
 SEEDS = 50000, 50100, 50200, 50300, 50400, 50500
 
@@ -43,3 +44,66 @@ def test_behind_a_stop_a_program_that_hung_does_not_begin_by_a_heartbeat_older_t
     rig.write(0, 0)
     for _ in range(3):
         assert rig.run(2 * LEASE_S).answer(0, ENABLE, 1200, peer=OTHER)
+
+
+def test_what_hung_begins_by_no_frame_without_a_heartbeat_that_its_pool_brings_now_and_then() -> None:
+    """By one of its connections the word had come last before the heartbeat moved, and was a new one for that."""
+    rig = begun()
+    rig.is_cell_silent = True
+    rig.run(0.5)
+    first, second = (Peer(OTHER.host, port) for port in (4002, 4003))
+    for beat, word in ((4, second), (5, first), (5, first), (5, first), (5, first)):
+        rig.write(1, 1200, 0, 0, beat, peer=first)
+        assert rig.run(0.05).answer(0, ENABLE, peer=word)
+    rig.is_cell_silent = False
+    refused = rig.run(0.2).answer(0, ENABLE, peer=second)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    rig.write(1, 1200, 0, 0, 6, peer=first)
+    assert rig.answer(0, ENABLE, peer=second) is None, "its program goes on"
+
+
+def test_behind_a_refused_start_a_program_beside_it_on_its_host_tares() -> None:
+    """Each of its tares came behind a refused run of the other one, and was taken for the same frame, for good."""
+    rig = begun()
+    rig.is_cell_silent = True
+    assert rig.run(0.5).answer(0, ENABLE, peer=OTHER)
+    other, answers = Peer(OTHER.host, OTHER.port + 1), []
+    for cycle in range(4):
+        rig.is_cell_silent = cycle < 3
+        answers.append(rig.run(0.2).answer(0, TARE, 0, peer=other))
+        rig.answer(4, 100 + cycle, peer=other)
+        rig.answer(4, cycle, peer=OTHER)
+        assert rig.answer(0, ENABLE, peer=OTHER) or cycle == 3
+    assert answers[-1] is None, answers
+
+
+def test_behind_a_stop_of_another_one_nothing_begins_that_has_never_beaten() -> None:
+    """The register stood at its heartbeat, behind a power cut, say: no stop lasted longer than its cycle."""
+    rig = begun()
+    for _ in range(5):
+        answers = [rig.answer(0, ENABLE, peer=OTHER), rig.answer(1, 300, 0, 0, 0, peer=OTHER)]
+        rig.run(0.05).write(0, 0)
+    assert answers[0] and answers[0].reason is RefusalReason.HEARTBEAT_STALE and rig.state is State.OFF
+    rig.write(1, 300, 0, 0, 1, peer=OTHER)
+    assert rig.answer(0, ENABLE, peer=OTHER) is None, "its program goes on"
+
+
+def test_behind_the_0_of_another_program_on_its_host_nothing_begins_whose_heartbeat_has_stood_since_the_start() -> None:
+    """Behind a power cut, say: it brought what stood in the register, had no beat to be too old, and began each time."""
+    rig, twin = begun(), Peer(OTHER.host, OTHER.port + 1)
+    answers = []
+    for _ in range(5):
+        answers.append(rig.answer(0, ENABLE, peer=OTHER))
+        rig.answer(1, 300, 0, 0, 0, peer=OTHER)
+        rig.run(0.05).write(0, 0, peer=twin)
+        rig.run(0.05)
+    assert answers[0] is None and all(answers[1:]), answers
+    rig.write(1, 300, 0, 0, 1, peer=OTHER)
+    assert rig.answer(0, ENABLE, peer=OTHER) is None, "its program goes on"
+
+
+def test_a_tare_with_the_heartbeat_of_the_last_one_is_refused_however_late_it_comes() -> None:
+    rig = begun()
+    assert rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER) is None
+    refused = rig.run(5.0).answer(0, TARE, 0, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE

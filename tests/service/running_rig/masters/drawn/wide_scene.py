@@ -22,7 +22,7 @@ from tests.service.running_rig.masters.drawn.programs import (
 from tests.service.running_rig.masters.drawn.scene import HAPPENINGS, PAGE, Scene
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, SELF_TEST, TAKE, TICK_S, SmallRig
 
-Pile = list[tuple[Program, Frame, tuple[int, int], int, bool]]
+Pile = list[tuple[Program, Frame, tuple[int, int], int]]
 
 
 def _low_floats(address: int, *names: str) -> Frame:
@@ -142,7 +142,7 @@ class WideScene(Scene):
             for program in self.programs:
                 for frame in program.due(rig.ticks):
                     if program.asks and not (waits[id(program)] and any(p is program for p, *_ in sent)):
-                        sent.append((program, frame, program.asks, program._beat, program.is_live))
+                        sent.append((program, frame, program.asks, program._beat))
             rig.ticks += 1
             rig.plant.advance(rig.wire.voltage_v, 10)
         self.told[-1] += f" {ticks} ({len(sent)} wait)"
@@ -150,17 +150,14 @@ class WideScene(Scene):
             rig.ticks, rig.suspended_s = before, rig.suspended_s + ticks * TICK_S
             for program in self.programs:
                 program._due, program._next = program._due - ticks, program._next - ticks
-                program.moved_s = min(program.moved_s, rig.now())
         self.deliver(sent)
         for program in self.programs:
             program.begin_anew()
 
     def deliver(self, sent: Pile) -> None:
         peers = {id(program): program.peer for program in self.programs}
-        for place, (program, frame, asks, beat, is_live) in enumerate(sent):
+        for place, (program, frame, asks, beat) in enumerate(sent):
             is_behind = any(later is program for later, *_ in sent[place + 1 :])
-            if is_live:
-                self.meant(program.identity)
             now = program.asks, program._beat
             program.asks, program._beat = asks, beat
             connection = peers[id(program)]
