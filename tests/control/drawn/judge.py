@@ -2,7 +2,7 @@
 asking the code. Laws of a held force count from when nobody has changed anything for long enough (`calm_s`)."""
 
 from collections import deque
-from math import cos, isfinite
+from math import cos, inf, isfinite
 from typing import TYPE_CHECKING
 
 from gateway.codes.faults import FaultCode
@@ -38,6 +38,7 @@ class Judge:
         self.hunted = False
         self.state = State.OFF
         self.last_sample_s = -1.0
+        self.counted_kg = 0.0
 
     # -- what a scene tells
 
@@ -56,8 +57,8 @@ class Judge:
 
     @property
     def told_weight_n(self) -> float:
-        command, payload_kg = self.rig.command, self.rig.settings.defaults.payload_kg
-        return (command.payload_kg or payload_kg) * GRAVITY_M_PER_S2 * cos(command.tilt_angle_rad)
+        """Of the payload that counts by now: another one that is told under a force follows along the ramp."""
+        return self.counted_kg * GRAVITY_M_PER_S2 * cos(self.rig.command.tilt_angle_rad)
 
     @property
     def tolerance_n(self) -> float:
@@ -117,6 +118,7 @@ class Judge:
     def look(self, record: Record) -> None:
         output = record.output
         dt_s = record.time_s - self.last_s
+        self._count_payload(record, dt_s)
         self._judge_voltage(record, dt_s)
         self._judge_registers(record, dt_s)
         self._judge_over_force(record)
@@ -132,6 +134,11 @@ class Judge:
         if self.top_n is not None and record.force_n > self.top_n:
             self.complain(f"{record.force_n:.2f} N press, {self.top_n:.2f} at most: {self.top_why}")
         self.last_s = record.time_s
+
+    def _count_payload(self, record: Record, dt_s: float) -> None:
+        told_kg = record.command.payload_kg or self.rig.settings.defaults.payload_kg
+        most_kg = self.ramp_n_per_s * dt_s / GRAVITY_M_PER_S2 if record.output.force_applied_n > 0.0 else inf
+        self.counted_kg += max(-most_kg, min(most_kg, told_kg - self.counted_kg))
 
     def _judge_voltage(self, record: Record, dt_s: float) -> None:
         output, limits, trim = record.output, self.rig.settings.limits, self.rig.settings.trim
