@@ -2,7 +2,7 @@
 asking the code. Laws of a held force count from when nobody has changed anything for long enough (`calm_s`)."""
 
 from collections import deque
-from math import cos, inf
+from math import cos, inf, isfinite
 from typing import TYPE_CHECKING
 
 from gateway.codes.faults import FaultCode
@@ -10,7 +10,7 @@ from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import Mode, State, StatusBit
 from tests.control.bench import Record, bsfm
 from tests.control.drawn.machine import GRAVITY_M_PER_S2
-from tests.control.drawn.output_laws import OutputLaws
+from tests.control.drawn.output_laws import TICK_S, OutputLaws
 
 if TYPE_CHECKING:
     from tests.control.drawn.rig import DrawnRig
@@ -36,7 +36,8 @@ class Judge(OutputLaws):
         self.hunted = False
         self.state = State.OFF
         self.last_sample_s = -1.0
-        self.counted_kg = 0.0
+        self.counted_kg, self.direction = 0.0, 1.0
+        self.is_payload_on_its_way, self.zero_n = False, 0.0
 
     # -- what a scene tells
 
@@ -71,17 +72,29 @@ class Judge(OutputLaws):
     def bias_n(self) -> float:
         """How much more than the true force is measured."""
         rig = self.rig
-        return self.told_weight_n - rig.machine.weight_n - rig.controller.zero_n
+        return self.direction * (self.told_weight_n - rig.machine.weight_n - rig.controller.zero_n)
+
+    @property
+    def scale(self) -> float:
+        """Of the calibration that counts: what is not measured while pulling is that of pushing by the piston's share."""
+        valve = self.rig.settings.valve
+        return self.rig.scale * (valve.pull_area_share if valve and self.direction < 0.0 else 1.0)
 
     def volts(self, force_n: float) -> tuple[float, float]:
         """Least and most voltage that the calibration knows for a contact force."""
-        branches, cell_n = bsfm(self.rig.scale).branches, force_n - self.told_weight_n
+        branches, cell_n = bsfm(self.scale).branches, force_n - self.direction * self.told_weight_n
         return branches.falling.inverse(cell_n)[0], branches.rising.inverse(cell_n)[0]
 
     def is_reachable(self, force_n: float) -> bool:
         """Whether a trim that has most of its way left reaches it from either side."""
         rig, limits, trim = self.rig, self.rig.settings.limits, self.rig.settings.trim
-        if not trim.gain_v_per_n_s or force_n > 55.0 * rig.scale + self.told_weight_n or not rig.machine.touches:
+        if (
+            not trim.gain_v_per_n_s
+            or force_n > 55.0 * self.scale + self.direction * self.told_weight_n
+            or not rig.machine.touches
+        ):
+            return False
+        if force_n > 55.0 * self.scale + self.direction * self.told_weight_n:
             return False
         least_v, most_v = self.volts(force_n)
         low_v, high_v = most_v - 0.6 * trim.limit_v, least_v + 0.6 * trim.limit_v
@@ -93,6 +106,12 @@ class Judge(OutputLaws):
         """What stands at most where this is asked for, with this trim."""
         limits = self.rig.settings.limits
         return self.rig.machine.bounds_n(min(limits.voltage_max_v, self.volts(force_n)[1] + trim_v))[1]
+
+    @property
+    def least_swing_n(self) -> float:
+        """From peak to peak, of a held force, that is worth a word."""
+        machine = self.rig.machine
+        return 0.8 + 2.0 * machine.noise_n + 2.0 * machine.gain_n_per_v * (machine.count_v + machine.dead_band_v)
 
     def settling_s(self) -> float:
         """Ramp, response, and the trim's way."""
@@ -110,9 +129,11 @@ class Judge(OutputLaws):
         output = record.output
         dt_s = record.time_s - self.last_s
         self._count_payload(record, dt_s)
+        self.direction = -1.0 if output.status & StatusBit.PULLING else 1.0
         self.judge_voltage(record, dt_s)
         self.judge_registers(record, dt_s)
         self._judge_over_force(record)
+        self._judge_measured(record)
         if output.state is State.FAULT and self.state is not State.FAULT and not self.is_spoilt:
             self._judge_fault(record)
         self.state = output.state
@@ -129,6 +150,7 @@ class Judge(OutputLaws):
     def _count_payload(self, record: Record, dt_s: float) -> None:
         told_kg = record.command.payload_kg or self.rig.settings.defaults.payload_kg
         most_kg = self.ramp_n_per_s * dt_s / GRAVITY_M_PER_S2 if record.output.force_applied_n > 0.0 else inf
+        self.is_payload_on_its_way = abs(told_kg - self.counted_kg) > 1e-9
         self.counted_kg += max(-most_kg, min(most_kg, told_kg - self.counted_kg))
 
     def _judge_over_force(self, record: Record) -> None:
@@ -136,8 +158,9 @@ class Judge(OutputLaws):
         if sample is None or sample.time_s == self.last_sample_s:
             return
         self.last_sample_s = sample.time_s
-        measured_n = self.measured_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
-        self.over = self.over + 1 if measured_n > limits.over_force_n + 1e-6 or sample.force_n > 98.0 else 0
+        contact_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
+        measured_n = self.measured_n = self.direction * contact_n
+        self.over = self.over + 1 if measured_n > limits.over_force_n + 1e-6 or abs(sample.force_n) > 98.0 else 0
         if self.over >= limits.over_force_samples and output.status & StatusBit.ENABLED:
             self.complain(f"{measured_n:.1f} N in {self.over} readings, {output.state.name}")
         is_high = measured_n > limits.force_max_n + self.noise_n + self.tolerance_n
@@ -152,9 +175,25 @@ class Judge(OutputLaws):
         ):
             self.complain(f"{measured_n:.1f} N measured of {limits.force_max_n} N at most, and nothing told")
 
+    def _judge_measured(self, record: Record) -> None:
+        """The register says what the cell reads, with the weight and without the zero; or nothing at all."""
+        sample, shown_n, bounds = record.sample, record.output.force_measured_n, self.rig.settings.supervision
+        late_s = inf if sample is None else record.time_s - sample.time_s - bounds.sample_timeout_s
+        if abs(late_s) < 1e-6:
+            return
+        if sample is None or late_s > 0.0 or abs(sample.force_n) >= bounds.saturation_n:
+            if isfinite(shown_n):
+                self.complain(f"{shown_n} N are told of {sample}")
+            return
+        slack_n = self.ramp_n_per_s * TICK_S if self.is_payload_on_its_way else 1e-6
+        zero_n, self.zero_n = self.zero_n, self.rig.controller.zero_n
+        read_n = sample.force_n - zero_n + self.told_weight_n
+        if not abs(shown_n - read_n) <= slack_n and zero_n == self.zero_n:  # a tare counts from the next reading on
+            self.complain(f"{shown_n} N are told, {read_n} N are read")
+
     def _judge_fault(self, record: Record) -> None:
         fault, machine, limits = record.output.fault, self.rig.machine, self.rig.settings.limits
-        share = machine.gain_n_per_v / (7.4 * self.rig.scale)
+        share = machine.along_n_per_v / (7.4 * self.scale)
         peak_n = max((force_n for _, force_n in self.recent), default=0.0) + self.bias_n
         if fault is FaultCode.MASTER_LOST or (
             fault is FaultCode.OVER_FORCE and peak_n > limits.over_force_n - self.noise_n
@@ -207,8 +246,6 @@ class Judge(OutputLaws):
         output, rig, now_s = record.output, self.rig, record.time_s
         is_lost = now_s - self.in_band_s > 1.5 + self.in_band_time_s
         is_told = bool(output.warnings & TOLD or output.status & StatusBit.TARGET_UNREACHABLE or self.hunted)
-        forces = [force_n for _, force_n in self.recent]
-        swing_n = max(forces) - min(forces)
         if is_lost and self.is_reachable(setpoint_n) and not self.hunted:
             self.complain(
                 f"{setpoint_n} N is not in band {calm_s:.1f} s behind the change: {self.smooth_n:.2f} N, "
@@ -218,7 +255,9 @@ class Judge(OutputLaws):
             is_lost and not is_told and calm_s > self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
         ):
             self.complain(f"{setpoint_n} N is not in band for {now_s - self.in_band_s:.1f} s, and nothing told")
-        machine = rig.machine
-        least_n = 0.8 + 2.0 * machine.noise_n + 2.0 * machine.gain_n_per_v * (machine.count_v + machine.dead_band_v)
-        if calm_s > self.settling_s() + LONG_S and swing_n > least_n and not is_told:
+        if is_told or self.least_swing_n == inf or calm_s <= self.settling_s() + LONG_S:
+            return
+        forces = [force_n for _, force_n in self.recent]
+        swing_n = max(forces) - min(forces)
+        if swing_n > self.least_swing_n:
             self.complain(f"the force swings by {swing_n:.2f} N at {setpoint_n} N, and nothing is told")
