@@ -5,12 +5,13 @@ break. Without contact there is no band: a reading of 0.2 N in free air is not a
 the same wait in vain, longer, and that by the force behind a low-pass: of a cell whose noise is as large as the band single
 readings are inside however far off the force is. With an in-band time that a single reading fills they are in band, but end no
 wait, and where the target is unreachable they are not in band, either. On a long ramp the force is compared with where the
-target is now, more roughly: air that fails on its way would else be told at its end, minutes later.
+target is now, more roughly: air that fails on its way would else be told at its end, minutes later. A target that
+comes no nearer to its setpoint, because the first rise looks wrong again and again, is missed as well.
 
 Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
 
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Final
 
 from gateway.control.demand import Demand
@@ -77,6 +78,11 @@ class SettlingCheck:
         self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
         self._noisy_s = 0.0  # so much longer neither in band nor unreachable than in band
         self._judged_s, self.is_noisy = inf, False
+        self._towards_n, self._left_n, self._nearer_s = (
+            nan,
+            inf,
+            -inf,
+        )  # setpoint, least distance of the target to it, when
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
     @property
@@ -105,6 +111,7 @@ class SettlingCheck:
         self._band.restart()
         self._answer.restart()
         self._driven_v = self._smooth_n = None
+        self._towards_n = nan
         self._wait_anew()
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
@@ -160,9 +167,16 @@ class SettlingCheck:
     def _follow_ramp(self, demand: Demand, inputs: LoopInputs, applied_n: float) -> None:
         if not inputs.touching:
             self._band.restart()
+            self._towards_n = nan
             return
+        left_n, was_held_back = abs(demand.force_n - applied_n), inputs.now_s - self._nearer_s > _RAMP_LATE_S
+        nearer_n = demand.manner.tolerance_n if was_held_back else 0.0
+        if demand.force_n != self._towards_n or left_n < self._left_n - nearer_n:
+            self._towards_n, self._left_n, self._nearer_s = demand.force_n, left_n, inputs.now_s
+        is_held_back = inputs.now_s - self._nearer_s > _RAMP_LATE_S
         most_n = _RAMP_BANDS * demand.manner.tolerance_n + _RAMP_LATE_S * demand.manner.ramp_n_per_s
-        self._band.go_along(inputs.now_s, abs(inputs.reading.contact_n - applied_n) <= most_n)
+        is_near = abs(inputs.reading.contact_n - applied_n) <= most_n
+        self._band.go_along(inputs.now_s, is_near and not is_held_back)
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
         """Return the event of a step in voltage mode. is_slewing: the output is still on its way.

@@ -35,7 +35,7 @@ class Judge(OutputLaws):
         self.top_why = ""
         self.hunted = False
         self.state = State.OFF
-        self.last_sample_s = -1.0
+        self.last_sample_s = self.told_s = -1.0
         self.counted_kg, self.direction = 0.0, 1.0
         self.is_payload_on_its_way, self.zero_n = False, 0.0
 
@@ -79,6 +79,11 @@ class Judge(OutputLaws):
         """Of the calibration that counts: what is not measured while pulling is that of pushing by the piston's share."""
         valve = self.rig.settings.valve
         return self.rig.scale * (valve.pull_area_share if valve and self.direction < 0.0 else 1.0)
+
+    @property
+    def slip_n(self) -> float:
+        """How far a held force may leap by itself, or with noise."""
+        return self.noise_n + 0.2
 
     def volts(self, force_n: float) -> tuple[float, float]:
         """Least and most voltage that the calibration knows for a contact force."""
@@ -232,7 +237,8 @@ class Judge(OutputLaws):
         if off_n <= 0.0 or self.disturbed & {"false", "frozen", "silent"} or not is_there:
             self.off_since_s = now_s
         off_s = now_s - max(self.off_since_s, self.calm_since_s)
-        if off_s <= 0.0 or not output.status & StatusBit.IN_BAND:
+        is_inside = abs(self.measured_n - command.force_setpoint_n) <= self.tolerance_n
+        if off_s <= 0.0 or is_inside or not output.status & StatusBit.IN_BAND:
             self.false_since_s = now_s
         if now_s - self.false_since_s > 0.5 + 1e-3 * rig.cell_ms:
             self.complain(f"in band of {command.force_setpoint_n} N, {self.read_n:.2f} N are read")
@@ -251,9 +257,9 @@ class Judge(OutputLaws):
                 f"{setpoint_n} N is not in band {calm_s:.1f} s behind the change: {self.smooth_n:.2f} N, "
                 f"trim {output.trim_v:.2f}, {output.limited_by.name}"
             )
-        elif (
-            is_lost and not is_told and calm_s > self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
-        ):
+        self.told_s = now_s if is_told else self.told_s  # at the band's edge it is told now and then
+        longest_s = self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
+        if is_lost and now_s - self.told_s > 10.0 and calm_s > longest_s:
             self.complain(f"{setpoint_n} N is not in band for {now_s - self.in_band_s:.1f} s, and nothing told")
         if is_told or self.least_swing_n == inf or calm_s <= self.settling_s() + LONG_S:
             return

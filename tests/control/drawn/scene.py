@@ -12,6 +12,7 @@ from tests.control.drawn.rig import DrawnRig, draw_response
 SHORT_S = 0.05, 0.2, 0.6, 2.0
 PAUSES_S = 0.0, 0.0, 0.1, 0.4, 1.0
 OVERSHOOT_SHARE = 0.1
+BUMP_V = 0.05  # a trim's step and noise
 
 
 class WatchedRig(DrawnRig):
@@ -152,13 +153,12 @@ class Scene:
         if not self._write("force", force_setpoint_n=force_n):
             return
         if is_held and rig.machine.touches:
-            slack_n = judge.noise_n + 0.2
             if force_n < was_n - 1.0:
-                judge.bound(top_n + slack_n, "a lowered setpoint")
+                judge.bound(top_n + judge.slip_n, "a lowered setpoint")
             elif force_n > was_n + 2.0:
                 standing_n = max(force_n - judge.bias_n, judge.standing_n(force_n, max(0.0, trim_v)))
                 lead = self._lead_share()
-                top_n = standing_n + (OVERSHOOT_SHARE + lead) * (standing_n - min(before_n, was_n)) + slack_n
+                top_n = standing_n + (OVERSHOOT_SHARE + lead) * (standing_n - min(before_n, was_n)) + judge.slip_n
                 judge.bound(top_n, "an overshoot")
         self._run(self.draw.choice((0.3, 1.0, 1.0, 2.0, 2.0, judge.settling_s() + 0.5)))
 
@@ -183,7 +183,11 @@ class Scene:
                 {"contact_ramp_s": draw.choice((0.1, 1.0))},
             )
         )
+        before = self.rig.last
         self._write("changes", **changes)
+        after, held = self.rig.last, StatusBit.IN_BAND | StatusBit.ENABLED
+        if before.status & after.status & held == held and abs(after.voltage_v - before.voltage_v) > BUMP_V:
+            self.judge.complain(f"{before.voltage_v:.3f} V become {after.voltage_v:.3f} V by {changes}")
 
     def _sine(self) -> None:
         """A master that writes a path."""

@@ -8,11 +8,12 @@ from tests.control.drawn.scene import Scene
 from tests.control.drawn.wide_scene import WideScene
 
 SCENES = 10
-KEPT = 726, 1135, 3467
-"""A swap beside a trim at its limit, one to the first measured response, and single readings that hid a force that was off."""
+KEPT = 726, 1135, 3467, 10191
+"""A swap beside a trim at its limit, one to the first measured response, single readings that hid a force that was off, and a
+target that was held back for good."""
 WIDE_SCENES = 3
-WIDE_KEPT = (2005,)
-"""A pull whose pressure came with the readback of a slow valve."""
+WIDE_KEPT = 2005, 3083
+"""A pull whose pressure came with the readback of a slow valve, and a force that rose when it was lowered."""
 
 
 def test_a_force_keeps_to_its_limits_arrives_and_tells_whatever_machine_and_master_are(budget: int) -> None:

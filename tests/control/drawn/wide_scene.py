@@ -3,10 +3,10 @@
 from math import inf
 
 from gateway.control import Output
-from gateway.registers.words import ControlBit, Mode, StatusBit
-from tests.control.bench import Record
+from gateway.registers.words import ControlBit, Mode, State, StatusBit
+from tests.control.bench import Record, bsfm
 from tests.control.drawn.judge import TOLD, Judge
-from tests.control.drawn.scene import Scene
+from tests.control.drawn.scene import BUMP_V, Scene
 from tests.control.drawn.valve_laws import ValveLaws
 from tests.control.drawn.wide_rig import WideRig
 
@@ -32,8 +32,16 @@ class WideJudge(Judge):
     def least_swing_n(self) -> float:
         return inf  # told by how often it crosses the setpoint
 
+    @property
+    def slip_n(self) -> float:
+        machine = self.rig.machine
+        return super().slip_n + machine.friction_n * machine.stick_share
+
     def is_reachable(self, force_n: float) -> bool:
-        return self.rig.is_tame and super().is_reachable(force_n)
+        """A weight that is against the tool may keep it from where it would be felt, and a trim begins with contact."""
+        least_n, _ = self.rig.machine.bounds_n(self.volts(force_n)[0])
+        is_felt = least_n > self.rig.settings.defaults.contact_threshold_n + self.noise_n
+        return self.rig.is_tame and is_felt and super().is_reachable(force_n)
 
     def look(self, record: Record) -> None:
         output, machine = record.output, self.rig.machine
@@ -134,6 +142,24 @@ class WideScene(Scene):
             self.judge.is_spoilt = True
             self._write("turn", control_word=word, force_setpoint_n=round(draw.uniform(2.0, 25.0), 2), mode=Mode.FORCE)
             self._run(draw.choice((0.1, 0.5, 3.0, self.judge.valve.longest_s() + self.judge.settling_s() + 1.0)))
+
+    def _volts(self) -> None:
+        """And back to the force that the calibration expects of them, which changes nothing yet."""
+        rig, draw, judge = self.rig, self.draw, self.judge
+        voltage_v = round(draw.uniform(0.5, 0.4 * rig.settings.limits.force_max_n / 7.4), 3)
+        judge.is_spoilt = True
+        if not self._write("volts", mode=Mode.VOLTAGE, voltage_setpoint_v=voltage_v):
+            return
+        self._run(draw.choice((0.3, 1.0, 1.0 + 10.0 * rig.whole_s)))
+        if rig.last.voltage_v != voltage_v or rig.last.status & StatusBit.SWITCHING:
+            return
+        at_rest = rig.now_s - judge.calm_since_s > 10.0 * rig.whole_s
+        force_n = bsfm(judge.scale).branches.rising.value(voltage_v) + judge.direction * judge.told_weight_n
+        if not self._write("newtons", mode=Mode.FORCE, force_setpoint_n=max(1.0, force_n)):
+            return
+        is_on = rig.last.status & StatusBit.ENABLED and rig.last.state is not State.FAULT
+        if at_rest and is_on and force_n > 1.5 and abs(rig.last.voltage_v - voltage_v) > BUMP_V:
+            judge.complain(f"{voltage_v:.3f} V become {rig.last.voltage_v:.3f} V by newtons")
 
     def _hold_long(self) -> None:
         self._run(self.draw.choice((2.0, 2.0, 10.0, 25.0)))

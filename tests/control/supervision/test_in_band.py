@@ -144,6 +144,17 @@ def test_a_force_that_comes_back_is_in_band_before_its_mean_is(in_band_time_s: f
     assert check.in_band and not check.unreachable
 
 
+@pytest.mark.parametrize(("held_back_n", "is_unreachable"), [(0.0, False), (2.0, True)])
+def test_a_target_that_is_taken_back_again_and_again_is_missed(held_back_n: float, is_unreachable: bool) -> None:
+    """Of a machine 2.4 times as strong behind a cell of 5 Hz: each rise was held back, for good, and nothing told."""
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(1000):
+        applied_n = 4.0 + 0.01 * (k % 50) if held_back_n else 4.0 + 0.01 * k
+        goal_n = held_back_n if held_back_n and k % 50 > 25 else 40.0
+        check.judge_force(demand(40.0, ramp_n_per_s=1.0), at(0.01 * k, applied_n), goal_n, applied_n)
+    assert check.unreachable is is_unreachable
+
+
 def test_what_has_gone_along_with_a_ramp_still_has_to_be_held_at_its_end() -> None:
     check, slow = SettlingCheck(UNREACHABLE_S), demand(ramp_n_per_s=1.0)
     for now_s in (0.0, 1.0):
