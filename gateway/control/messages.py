@@ -63,7 +63,7 @@ def noisy_sentence(force_n: float, two_values: str) -> str:
         "the amplifier"
     )
     return (
-        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so nothing counts as holding: "
+        f"W361 at {force_n:.1f} N single readings keep leaving the band that their mean is in, so holding does not last: "
         f"{defective_words(two_values) if two_values else why}"
     )
 

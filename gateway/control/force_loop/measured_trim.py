@@ -10,7 +10,8 @@ the stiction that a rig's zone is for is in the model here, but never less than 
 smoothed error.
 
 What was learned belongs to the force and to the direction in which it was reached: friction is off the other way after a turn.
-So it fades within SAME_WAY_N of travel on and within OTHER_WAY_N of travel back, and comes back with the target. Only what was
+So it fades within SAME_WAY_N of travel on and within OTHER_WAY_N of travel back, but no faster than the target goes back: a
+force that is lowered would rise first. It comes back with the target. Only what was
 learned with the same sign in both directions, an offset of that range of forces, outlives a turn.
 
 A supervisor watches for hunting: corrections that change sign again and again at one target are friction's (or the
@@ -157,7 +158,7 @@ class MeasuredTrim:
         if not (self._own_n or self._common_n):
             return
         away_n = self._going_then * (self._at_n - self._learned_at_n)
-        reach_n = self._same_way_n if away_n >= 0.0 else OTHER_WAY_N
+        reach_n = self._same_way_n if away_n >= 0.0 else max(OTHER_WAY_N, abs(self._own_n))
         self.value_n = self._common_here_n() + self._own_n * exp(-abs(away_n) / reach_n)
         self.limited_by = LimitedBy.NONE
 

@@ -3,13 +3,15 @@
 In band means: target at its goal, contact, and the measured force within the tolerance, for the in-band time without a
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
 the same wait in vain, longer, and that by the force behind a low-pass: of a cell whose noise is as large as the band single
-readings are inside however far off the force is. On a long ramp the force is compared with where the target is now, more
-roughly: air that fails on its way would else be told at its end, minutes later.
+readings are inside however far off the force is. With an in-band time that a single reading fills they are in band, but end no
+wait, and where the target is unreachable they are not in band, either. On a long ramp the force is compared with where the
+target is now, more roughly: air that fails on its way would else be told at its end, minutes later. A target that
+comes no nearer to its setpoint, because the first rise looks wrong again and again, is missed as well.
 
 Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
 
-from math import inf, isfinite
+from math import inf, isfinite, nan
 from typing import Final
 
 from gateway.control.demand import Demand
@@ -21,7 +23,7 @@ _WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 _RAMP_BANDS: Final = 2.0  # tolerances, so far a force in contact may be off on a ramp, ...
 _RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that nobody has measured
 _SMOOTHING_S: Final = 0.3  # of the force that is called missed
-_NOISY_S: Final = 5.0  # beyond the in-band time, neither in band nor unreachable; ...
+_NOISY_S: Final = 5.0  # beyond the in-band time, so much more neither in band nor unreachable than in band; ...
 _NOISY_WAITS: Final = 2.0  # ... and so many times what makes a target unreachable: that is told first
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
 _LEAST_SHARE: Final = 0.3  # of the expected force: less is no answer, though friction may keep the tool in contact, ...
@@ -50,10 +52,11 @@ class InBandTimer:
         """Compare once more. is_inside: the comparison of this moment, with the target at its goal; is_out: whether that is
         missed, where it is not the same."""
         self._in_since_s = min(self._in_since_s, now_s) if is_inside else inf
-        self.in_band = now_s - self._in_since_s >= in_band_time_s
-        is_out = not is_inside if is_out is None else is_out and not self.in_band
+        inside_s = now_s - self._in_since_s
+        is_out = not is_inside if is_out is None else is_out and inside_s < max(in_band_time_s, _SMOOTHING_S)
         self._out_since_s = min(self._out_since_s, now_s) if is_out else inf
         self.unreachable = now_s - self._out_since_s >= self._unreachable_s
+        self.in_band = inside_s >= in_band_time_s and not self.unreachable
 
     def go_along(self, now_s: float, is_near: bool) -> None:
         """Compare on the way to the goal: nothing is in band yet, and what is not near counts as out of it."""
@@ -65,7 +68,7 @@ class SettlingCheck:
     """Decides which event of the state table a step of the force loop is. Times are monotonic seconds.
 
     unreachable_s: how long out of band, or without an answer in voltage mode, until the target counts as unreachable. is_noisy:
-    readings keep crossing the edges of the band, so that the force is neither held nor missed.
+    readings keep crossing the edges of the band, so that the force is neither missed nor held for half of the time.
     """
 
     def __init__(self, unreachable_s: float) -> None:
@@ -73,8 +76,13 @@ class SettlingCheck:
         self._band = InBandTimer(unreachable_s)
         self._answer = InBandTimer(unreachable_s)
         self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
-        self._otherwise_since_s = inf  # since when the force has been other than is_noisy says
-        self.is_noisy = False
+        self._noisy_s = 0.0  # so much longer neither in band nor unreachable than in band
+        self._judged_s, self.is_noisy = inf, False
+        self._towards_n, self._left_n, self._nearer_s = (
+            nan,
+            inf,
+            -inf,
+        )  # setpoint, least distance of the target to it, when
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
     @property
@@ -103,6 +111,7 @@ class SettlingCheck:
         self._band.restart()
         self._answer.restart()
         self._driven_v = self._smooth_n = None
+        self._towards_n = nan
         self._wait_anew()
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
@@ -132,18 +141,20 @@ class SettlingCheck:
         return _MOVE if inputs.touching or applied_n != goal_n else _WAIT
 
     def _wait_anew(self) -> None:
-        self._otherwise_since_s, self.is_noisy = inf, False
+        self._noisy_s, self._judged_s, self.is_noisy = 0.0, inf, False
 
     def _judge_noise(self, now_s: float, in_band_time_s: float) -> None:
-        """Of a wide swing the smoothed force crosses the edges of the band, too: it is never missed for long, either."""
-        is_undecided = not (self._band.in_band or self._band.unreachable)
+        """Of a wide swing the smoothed force crosses the edges of the band, too: it is never missed for long, either. A moment
+        in the band takes back what it has lasted: it neither ends what has been noisy nor hides it."""
+        passed_s, self._judged_s = max(0.0, now_s - self._judged_s), now_s
         longest_s = in_band_time_s + max(_NOISY_S, _NOISY_WAITS * self._unreachable_s)
-        if is_undecided is self.is_noisy:
-            self._otherwise_since_s = inf
-        else:  # a moment in the band does not end what has been noisy, or the warning would come and go
-            self._otherwise_since_s = min(self._otherwise_since_s, now_s)
-        if now_s - self._otherwise_since_s > longest_s or self._band.unreachable:
-            self._otherwise_since_s, self.is_noisy = inf, is_undecided
+        self._noisy_s = max(0.0, self._noisy_s + (-passed_s if self._band.in_band else passed_s))
+        if self._band.unreachable:
+            self._noisy_s = 0.0
+        if self._noisy_s > longest_s:
+            self._noisy_s, self.is_noisy = longest_s, True
+        elif self._noisy_s <= 0.0:
+            self.is_noisy = False
 
     def _smooth(self, reading: Reading) -> float:
         if self._smooth_n is None or not isfinite(self._smooth_n):
@@ -156,9 +167,16 @@ class SettlingCheck:
     def _follow_ramp(self, demand: Demand, inputs: LoopInputs, applied_n: float) -> None:
         if not inputs.touching:
             self._band.restart()
+            self._towards_n = nan
             return
+        left_n, was_held_back = abs(demand.force_n - applied_n), inputs.now_s - self._nearer_s > _RAMP_LATE_S
+        nearer_n = demand.manner.tolerance_n if was_held_back else 0.0
+        if demand.force_n != self._towards_n or left_n < self._left_n - nearer_n:
+            self._towards_n, self._left_n, self._nearer_s = demand.force_n, left_n, inputs.now_s
+        is_held_back = inputs.now_s - self._nearer_s > _RAMP_LATE_S
         most_n = _RAMP_BANDS * demand.manner.tolerance_n + _RAMP_LATE_S * demand.manner.ramp_n_per_s
-        self._band.go_along(inputs.now_s, abs(inputs.reading.contact_n - applied_n) <= most_n)
+        is_near = abs(inputs.reading.contact_n - applied_n) <= most_n
+        self._band.go_along(inputs.now_s, is_near and not is_held_back)
 
     def judge_voltage(self, demand: Demand, inputs: LoopInputs, *, is_slewing: bool) -> StateEvent:
         """Return the event of a step in voltage mode. is_slewing: the output is still on its way.

@@ -29,7 +29,7 @@ class ValveSwitch:
         self.commanded = _SAFE.get(settings.safe)
         self.is_switching, self._is_well = True, False
         self._vented_s = inf
-        self._told_s = -inf
+        self._told_s = self._confirmed_s = -inf  # confirmed: of what was told last
         self._differs_s = inf
         self._has_been_told = False  # of where it is to stand, or has stood there: before, it cannot be blamed
         self._status = ValveStatus()
@@ -63,12 +63,14 @@ class ValveSwitch:
             self.commanded = status.stands
         self._vented_s = min(self._vented_s, now_s) if is_vented else inf
         if wanted is not None and wanted is not self.commanded and self._may_switch(now_s):
-            self.commanded, self._told_s, self._differs_s = wanted, now_s, inf  # a new order has its own time
+            self.commanded, self._told_s = wanted, now_s
+            self._confirmed_s = self._differs_s = inf  # a new order has its own time
         is_confirmed = self.commanded is not None and status.stands is self.commanded
+        self._confirmed_s = min(self._confirmed_s, now_s) if is_confirmed else self._confirmed_s
         self._has_been_told = self._has_been_told or is_confirmed or self.order is not None
         is_known = self._has_been_told and status.stands is not None
         self._differs_s = min(self._differs_s, now_s) if is_known and not is_confirmed else inf
-        has_dwelt = now_s - self._told_s >= self.settings.dwell_s
+        has_dwelt = now_s - self._confirmed_s >= self.settings.dwell_s
         is_wanted = wanted is None or wanted is self.commanded
         self.is_switching = not (is_confirmed and has_dwelt and is_wanted)
         self._is_well = self.first_cause(now_s) is None

@@ -2,33 +2,31 @@
 asking the code. Laws of a held force count from when nobody has changed anything for long enough (`calm_s`)."""
 
 from collections import deque
-from math import cos, isfinite
+from math import cos, inf, isfinite
 from typing import TYPE_CHECKING
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
-from gateway.registers.words import LimitedBy, Mode, State, StatusBit
+from gateway.registers.words import Mode, State, StatusBit
 from tests.control.bench import Record, bsfm
 from tests.control.drawn.machine import GRAVITY_M_PER_S2
+from tests.control.drawn.output_laws import TICK_S, OutputLaws
 
 if TYPE_CHECKING:
     from tests.control.drawn.rig import DrawnRig
 
-TICK_S = 0.01
 TOLD = WarningBit.TARGET_UNREACHABLE | WarningBit.TRIM_SATURATED | WarningBit.FORCE_UNSTEADY
 LONG_S = 3.0
 
 
-class Judge:
-    """broken: the first law that did not hold. disturbed: what goes on just now that no held force need bear."""
+class Judge(OutputLaws):
+    """disturbed: what goes on just now that no held force need bear."""
 
     def __init__(self, rig: "DrawnRig") -> None:
-        self.rig, self.broken = rig, ""
+        super().__init__(rig)
         self.disturbed: set[str] = set()
         self.is_spoilt = False  # something has happened since the enable that a fault may come of
         self.calm_since_s = self.last_s = self.in_band_s = 0.0
-        self.most_v = rig.settings.limits.safe_voltage_v
-        self.most_applied_n = self.ramped_n_per_s = 0.0
         self.over = 0
         self.high_since_s: float | None = None
         self.off_since_s = self.false_since_s = self.smooth_n = self.measured_n = self.read_n = 0.0
@@ -37,7 +35,9 @@ class Judge:
         self.top_why = ""
         self.hunted = False
         self.state = State.OFF
-        self.last_sample_s = -1.0
+        self.last_sample_s = self.told_s = -1.0
+        self.counted_kg, self.direction = 0.0, 1.0
+        self.is_payload_on_its_way, self.zero_n = False, 0.0
 
     # -- what a scene tells
 
@@ -49,15 +49,12 @@ class Judge:
         """The true force goes no higher until something else is asked for."""
         self.top_n, self.top_why = top_n, why
 
-    def complain(self, what: str) -> None:
-        self.broken = self.broken or f"{self.rig.now_s:.3f} {what}"
-
     # -- what is known of the machine
 
     @property
     def told_weight_n(self) -> float:
-        command, payload_kg = self.rig.command, self.rig.settings.defaults.payload_kg
-        return (command.payload_kg or payload_kg) * GRAVITY_M_PER_S2 * cos(command.tilt_angle_rad)
+        """Of the payload that counts by now: another one that is told under a force follows along the ramp."""
+        return self.counted_kg * GRAVITY_M_PER_S2 * cos(self.rig.command.tilt_angle_rad)
 
     @property
     def tolerance_n(self) -> float:
@@ -68,10 +65,6 @@ class Judge:
         return self.rig.command.in_band_time_s or self.rig.settings.defaults.in_band_time_s
 
     @property
-    def ramp_n_per_s(self) -> float:
-        return self.rig.command.force_ramp_n_per_s or self.rig.settings.defaults.force_ramp_n_per_s
-
-    @property
     def noise_n(self) -> float:
         return 4.0 * self.rig.machine.noise_n + self.rig.machine.quantum_n
 
@@ -79,17 +72,34 @@ class Judge:
     def bias_n(self) -> float:
         """How much more than the true force is measured."""
         rig = self.rig
-        return self.told_weight_n - rig.machine.weight_n - rig.controller.zero_n
+        return self.direction * (self.told_weight_n - rig.machine.weight_n - rig.controller.zero_n)
+
+    @property
+    def scale(self) -> float:
+        """Of the calibration that counts: what is not measured while pulling is that of pushing by the piston's share."""
+        valve = self.rig.settings.valve
+        return self.rig.scale * (valve.pull_area_share if valve and self.direction < 0.0 else 1.0)
+
+    @property
+    def slip_n(self) -> float:
+        """How far a held force may leap by itself, or with noise."""
+        return self.noise_n + 0.2
 
     def volts(self, force_n: float) -> tuple[float, float]:
         """Least and most voltage that the calibration knows for a contact force."""
-        branches, cell_n = bsfm(self.rig.scale).branches, force_n - self.told_weight_n
+        branches, cell_n = bsfm(self.scale).branches, force_n - self.direction * self.told_weight_n
         return branches.falling.inverse(cell_n)[0], branches.rising.inverse(cell_n)[0]
 
     def is_reachable(self, force_n: float) -> bool:
         """Whether a trim that has most of its way left reaches it from either side."""
         rig, limits, trim = self.rig, self.rig.settings.limits, self.rig.settings.trim
-        if not trim.gain_v_per_n_s or force_n > 55.0 * rig.scale + self.told_weight_n or not rig.machine.touches:
+        if (
+            not trim.gain_v_per_n_s
+            or force_n > 55.0 * self.scale + self.direction * self.told_weight_n
+            or not rig.machine.touches
+        ):
+            return False
+        if force_n > 55.0 * self.scale + self.direction * self.told_weight_n:
             return False
         least_v, most_v = self.volts(force_n)
         low_v, high_v = most_v - 0.6 * trim.limit_v, least_v + 0.6 * trim.limit_v
@@ -101,6 +111,12 @@ class Judge:
         """What stands at most where this is asked for, with this trim."""
         limits = self.rig.settings.limits
         return self.rig.machine.bounds_n(min(limits.voltage_max_v, self.volts(force_n)[1] + trim_v))[1]
+
+    @property
+    def least_swing_n(self) -> float:
+        """From peak to peak, of a held force, that is worth a word."""
+        machine = self.rig.machine
+        return 0.8 + 2.0 * machine.noise_n + 2.0 * machine.gain_n_per_v * (machine.count_v + machine.dead_band_v)
 
     def settling_s(self) -> float:
         """Ramp, response, and the trim's way."""
@@ -117,9 +133,12 @@ class Judge:
     def look(self, record: Record) -> None:
         output = record.output
         dt_s = record.time_s - self.last_s
-        self._judge_voltage(record, dt_s)
-        self._judge_registers(record, dt_s)
+        self._count_payload(record, dt_s)
+        self.direction = -1.0 if output.status & StatusBit.PULLING else 1.0
+        self.judge_voltage(record, dt_s)
+        self.judge_registers(record, dt_s)
         self._judge_over_force(record)
+        self._judge_measured(record)
         if output.state is State.FAULT and self.state is not State.FAULT and not self.is_spoilt:
             self._judge_fault(record)
         self.state = output.state
@@ -133,85 +152,20 @@ class Judge:
             self.complain(f"{record.force_n:.2f} N press, {self.top_n:.2f} at most: {self.top_why}")
         self.last_s = record.time_s
 
-    def _judge_voltage(self, record: Record, dt_s: float) -> None:
-        output, limits, trim = record.output, self.rig.settings.limits, self.rig.settings.trim
-        voltage_v, safe_v = output.voltage_v, limits.safe_voltage_v
-        if not (isfinite(voltage_v) and min(safe_v, limits.voltage_min_v) <= voltage_v <= limits.voltage_max_v):
-            self.complain(f"{voltage_v} V out")
-        self.most_v += limits.voltage_slew_v_per_s * dt_s
-        if voltage_v > self.most_v + limits.voltage_slew_v_per_s * TICK_S + 1e-9 and voltage_v != safe_v:
-            self.complain(f"{voltage_v:.3f} V, {self.most_v:.3f} V by the slew")
-        self.most_v = min(self.most_v, voltage_v) if voltage_v != safe_v else safe_v
-        is_on = bool(output.status & StatusBit.ENABLED)
-        if is_on is not (output.state in (State.READY, State.RAMPING, State.HOLDING)):
-            self.complain(f"{output.state.name} with {output.status!r}")
-        if not is_on and (voltage_v, output.trim_v, output.force_applied_n, output.force_accepted_n) != (
-            safe_v,
-            0.0,
-            0.0,
-            0.0,
-        ):
-            self.complain(
-                f"{voltage_v} V, trim {output.trim_v}, {output.force_applied_n} N applied in {output.state.name}"
-            )
-        if abs(output.trim_v) > trim.limit_v + 1e-9:
-            self.complain(f"trim {output.trim_v}")
-        if is_on:
-            self._judge_limits(record)
-
-    def _judge_limits(self, record: Record) -> None:
-        """Of an enabled output: but for limits, it is feedforward and trim, and the limit is told."""
-        output, limits, voltage_v = record.output, self.rig.settings.limits, record.output.voltage_v
-        asked_v = output.feedforward_v + output.trim_v
-        match output.limited_by:
-            case LimitedBy.VOLTAGE_SLEW:
-                is_so = voltage_v < asked_v
-            case LimitedBy.VOLTAGE_RANGE:
-                is_so = voltage_v in (limits.voltage_min_v, limits.voltage_max_v) and voltage_v != asked_v
-            case LimitedBy.SMALLEST_FORCE:
-                is_so = voltage_v == limits.voltage_min_v
-            case _:
-                is_so = abs(voltage_v - asked_v) < 1e-9
-        if abs(output.trim_v) == self.rig.settings.trim.limit_v > 0.0 and output.limited_by is LimitedBy.NONE:
-            self.complain(f"trim {output.trim_v} at its limit, and nothing told")
-        if output.limited_by is LimitedBy.TRIM_RANGE:
-            is_so = is_so and abs(output.trim_v) > 0.0
-        if not is_so:
-            self.complain(
-                f"{voltage_v} V of {output.feedforward_v} and {output.trim_v}, limited by {output.limited_by.name}"
-            )
-        if bool(output.status & StatusBit.LIMITED) is not (output.limited_by is not LimitedBy.NONE):
-            self.complain(f"limited by {output.limited_by.name}, {output.status!r}")
-
-    def _judge_registers(self, record: Record, dt_s: float) -> None:
-        output, command = record.output, record.command
-        is_on = bool(output.status & StatusBit.ENABLED)
-        if output.force_requested_n != command.force_setpoint_n:
-            self.complain(f"{output.force_requested_n} N requested of {command.force_setpoint_n}")
-        is_led = is_on and command.mode is Mode.FORCE and not output.warnings & WarningBit.MASTER_LOST
-        if is_led and output.force_accepted_n != command.force_setpoint_n:
-            self.complain(f"{output.force_accepted_n} N accepted of {command.force_setpoint_n}")
-        if bool(output.status & StatusBit.FAULT) is not (output.state is State.FAULT):
-            self.complain(f"{output.state.name}, {output.status!r}")
-        if (output.state is State.FAULT) is not (output.fault != FaultCode.NONE):
-            self.complain(f"{output.state.name}, fault {output.fault.name}")
-        if not is_on or command.mode is not Mode.FORCE:
-            self.most_applied_n = 99.0 if is_on else 0.0
-            return
-        if self.ramp_n_per_s != self.ramped_n_per_s:  # a tick of the one before may have been claimed
-            self.ramped_n_per_s, self.most_applied_n = self.ramp_n_per_s, output.force_applied_n
-        self.most_applied_n += self.ramp_n_per_s * dt_s
-        if output.force_applied_n > self.most_applied_n + self.ramp_n_per_s * TICK_S + 1e-6:
-            self.complain(f"{output.force_applied_n:.2f} N applied, {self.most_applied_n:.2f} by the ramp")
-        self.most_applied_n = min(self.most_applied_n, output.force_applied_n)
+    def _count_payload(self, record: Record, dt_s: float) -> None:
+        told_kg = record.command.payload_kg or self.rig.settings.defaults.payload_kg
+        most_kg = self.ramp_n_per_s * dt_s / GRAVITY_M_PER_S2 if record.output.force_applied_n > 0.0 else inf
+        self.is_payload_on_its_way = abs(told_kg - self.counted_kg) > 1e-9
+        self.counted_kg += max(-most_kg, min(most_kg, told_kg - self.counted_kg))
 
     def _judge_over_force(self, record: Record) -> None:
         limits, sample, output = self.rig.settings.limits, record.sample, record.output
         if sample is None or sample.time_s == self.last_sample_s:
             return
         self.last_sample_s = sample.time_s
-        measured_n = self.measured_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
-        self.over = self.over + 1 if measured_n > limits.over_force_n + 1e-6 or sample.force_n > 98.0 else 0
+        contact_n = sample.force_n - self.rig.controller.zero_n + self.told_weight_n
+        measured_n = self.measured_n = self.direction * contact_n
+        self.over = self.over + 1 if measured_n > limits.over_force_n + 1e-6 or abs(sample.force_n) > 98.0 else 0
         if self.over >= limits.over_force_samples and output.status & StatusBit.ENABLED:
             self.complain(f"{measured_n:.1f} N in {self.over} readings, {output.state.name}")
         is_high = measured_n > limits.force_max_n + self.noise_n + self.tolerance_n
@@ -226,9 +180,25 @@ class Judge:
         ):
             self.complain(f"{measured_n:.1f} N measured of {limits.force_max_n} N at most, and nothing told")
 
+    def _judge_measured(self, record: Record) -> None:
+        """The register says what the cell reads, with the weight and without the zero; or nothing at all."""
+        sample, shown_n, bounds = record.sample, record.output.force_measured_n, self.rig.settings.supervision
+        late_s = inf if sample is None else record.time_s - sample.time_s - bounds.sample_timeout_s
+        if abs(late_s) < 1e-6:
+            return
+        if sample is None or late_s > 0.0 or abs(sample.force_n) >= bounds.saturation_n:
+            if isfinite(shown_n):
+                self.complain(f"{shown_n} N are told of {sample}")
+            return
+        slack_n = self.ramp_n_per_s * TICK_S if self.is_payload_on_its_way else 1e-6
+        zero_n, self.zero_n = self.zero_n, self.rig.controller.zero_n
+        read_n = sample.force_n - zero_n + self.told_weight_n
+        if not abs(shown_n - read_n) <= slack_n and zero_n == self.zero_n:  # a tare counts from the next reading on
+            self.complain(f"{shown_n} N are told, {read_n} N are read")
+
     def _judge_fault(self, record: Record) -> None:
         fault, machine, limits = record.output.fault, self.rig.machine, self.rig.settings.limits
-        share = machine.gain_n_per_v / (7.4 * self.rig.scale)
+        share = machine.along_n_per_v / (7.4 * self.scale)
         peak_n = max((force_n for _, force_n in self.recent), default=0.0) + self.bias_n
         if fault is FaultCode.MASTER_LOST or (
             fault is FaultCode.OVER_FORCE and peak_n > limits.over_force_n - self.noise_n
@@ -267,7 +237,8 @@ class Judge:
         if off_n <= 0.0 or self.disturbed & {"false", "frozen", "silent"} or not is_there:
             self.off_since_s = now_s
         off_s = now_s - max(self.off_since_s, self.calm_since_s)
-        if off_s <= 0.0 or not output.status & StatusBit.IN_BAND:
+        is_inside = abs(self.measured_n - command.force_setpoint_n) <= self.tolerance_n
+        if off_s <= 0.0 or is_inside or not output.status & StatusBit.IN_BAND:
             self.false_since_s = now_s
         if now_s - self.false_since_s > 0.5 + 1e-3 * rig.cell_ms:
             self.complain(f"in band of {command.force_setpoint_n} N, {self.read_n:.2f} N are read")
@@ -281,18 +252,18 @@ class Judge:
         output, rig, now_s = record.output, self.rig, record.time_s
         is_lost = now_s - self.in_band_s > 1.5 + self.in_band_time_s
         is_told = bool(output.warnings & TOLD or output.status & StatusBit.TARGET_UNREACHABLE or self.hunted)
-        forces = [force_n for _, force_n in self.recent]
-        swing_n = max(forces) - min(forces)
         if is_lost and self.is_reachable(setpoint_n) and not self.hunted:
             self.complain(
                 f"{setpoint_n} N is not in band {calm_s:.1f} s behind the change: {self.smooth_n:.2f} N, "
                 f"trim {output.trim_v:.2f}, {output.limited_by.name}"
             )
-        elif (
-            is_lost and not is_told and calm_s > self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
-        ):
+        self.told_s = now_s if is_told else self.told_s  # at the band's edge it is told now and then
+        longest_s = self.settling_s() + 8.0 + 3.0 * rig.settings.supervision.unreachable_s
+        if is_lost and now_s - self.told_s > 10.0 and calm_s > longest_s:
             self.complain(f"{setpoint_n} N is not in band for {now_s - self.in_band_s:.1f} s, and nothing told")
-        machine = rig.machine
-        least_n = 0.8 + 2.0 * machine.noise_n + 2.0 * machine.gain_n_per_v * (machine.count_v + machine.dead_band_v)
-        if calm_s > self.settling_s() + LONG_S and swing_n > least_n and not is_told:
+        if is_told or self.least_swing_n == inf or calm_s <= self.settling_s() + LONG_S:
+            return
+        forces = [force_n for _, force_n in self.recent]
+        swing_n = max(forces) - min(forces)
+        if swing_n > self.least_swing_n:
             self.complain(f"the force swings by {swing_n:.2f} N at {setpoint_n} N, and nothing is told")

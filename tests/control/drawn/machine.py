@@ -49,6 +49,11 @@ class Machine:
         return self.payload_kg * GRAVITY_M_PER_S2 * cos(self.tilt_rad)
 
     @property
+    def along_n_per_v(self) -> float:
+        """Of the way in which it moves."""
+        return self.gain_n_per_v
+
+    @property
     def touches(self) -> bool:
         return self.gap_s <= 0.0
 

@@ -30,8 +30,8 @@ class DrawnRig(Bench):
         draw = Random(seed)
         self.tick_ms = draw.choice((4, 5, 10, 10, 10, 20, 50))
         self.cell_ms = draw.choice((10, 10, 10, 12, 20, 25, 50, 100, 200))
-        machine = draw_machine(draw)
-        super().__init__(draw_settings(draw, machine, self.tick_ms, self.cell_ms), seed)
+        machine = self.drawn_machine(draw, seed)
+        super().__init__(self.drawn_settings(draw, machine, seed), seed)
         self.plant = machine  # type: ignore[assignment]
         self.machine = machine
         if self.cell_ms >= SLOW_CELL_MS:
@@ -43,6 +43,12 @@ class DrawnRig(Bench):
         self.cell_late_ms, self.false_n, self.answers_late = 0, 0.0, False
         self._felt: deque[tuple[int, float]] = deque()
         self.readings: deque[tuple[float, float]] = deque(maxlen=400)
+
+    def drawn_machine(self, draw: Random, seed: int) -> Machine:
+        return draw_machine(draw)
+
+    def drawn_settings(self, draw: Random, machine: Machine, seed: int) -> ControlSettings:
+        return draw_settings(draw, machine, self.tick_ms, self.cell_ms)
 
     @property
     def whole_s(self) -> float:

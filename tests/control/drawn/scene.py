@@ -12,6 +12,7 @@ from tests.control.drawn.rig import DrawnRig, draw_response
 SHORT_S = 0.05, 0.2, 0.6, 2.0
 PAUSES_S = 0.0, 0.0, 0.1, 0.4, 1.0
 OVERSHOOT_SHARE = 0.1
+BUMP_V = 0.05  # a trim's step and noise
 
 
 class WatchedRig(DrawnRig):
@@ -31,15 +32,21 @@ class WatchedRig(DrawnRig):
 class Scene:
     """told: what has happened, for who reads of a law that did not hold."""
 
+    lengths_s: tuple[float, ...] = 6.0, 10.0, 15.0
+
     def __init__(self, seed: int) -> None:
         self.seed, self.draw = seed, Random(f"scene {seed}")
-        self.rig = WatchedRig(seed)
+        self.build(seed)
         machine, settings = self.rig.machine, self.rig.settings
-        self.rig.judge = self.judge = Judge(self.rig)
         self.told = [f"{machine}", f"{settings}", f"{self.rig.response}, {self.rig.tick_ms} ms, {self.rig.cell_ms} ms"]
         if settings.supervision.lease_s:
             self.rig.heartbeat_every_ms = 100
         self.is_calm = self.draw.random() < 0.4
+
+    def build(self, seed: int) -> None:
+        """Draw the rig, and give it its judge."""
+        self.rig = WatchedRig(seed)
+        self.rig.judge = self.judge = Judge(self.rig)
 
     def note(self, words: str) -> None:
         self.told.append(f"{self.rig.now_s:.2f} {words}")
@@ -47,7 +54,7 @@ class Scene:
     def play(self) -> "Scene":
         """Play it to its end, or to the first law that does not hold."""
         rig, draw = self.rig, self.draw
-        until_s = draw.choice((6.0, 10.0, 15.0))
+        until_s = draw.choice(self.lengths_s)
         self._run(0.3)
         self._write("payload told", payload_kg=rig.machine.payload_kg)
         while rig.now_s < until_s and not self.judge.broken:
@@ -68,19 +75,28 @@ class Scene:
         return rig.refused is None
 
     def _act(self) -> None:
-        draw, state = self.draw, self.rig.last.state
+        state = self.rig.last.state
         if state is State.FAULT:
             self._mend()
             return
         if state is State.OFF:
             self._enable()
             return
+        self.draw.choice(self.acts())()
+        self._run(self.draw.choice(PAUSES_S))
+
+    def acts(self) -> list[Callable[[], None]]:
+        """What may happen to an enabled output, as often as it is in the list."""
         acts: list[Callable[[], None]] = [self._go, self._go, self._go, self._hold, self._hold]
-        acts += [self._go, self._go, self._change, self._sine, draw.choice((self._volts, self._switch_off))]
+        acts += [self._go, self._go, self._change, self._sine, self.draw.choice((self._volts, self._switch_off))]
         if not self.is_calm:
             acts += [self._befall, self._befall, self._befall, self._swap]
-        draw.choice(acts)()
-        self._run(draw.choice(PAUSES_S))
+        return acts
+
+    @property
+    def enabling(self) -> ControlBit:
+        """The word that enables."""
+        return ControlBit.ENABLE
 
     def _force_n(self) -> float:
         most_n = self.rig.settings.limits.force_max_n
@@ -114,7 +130,7 @@ class Scene:
         self.judge.is_spoilt = bool(self.judge.disturbed)
         force_n = self.draw.choice((0.0, self._force_n()))
         self._write(
-            "enable", control_word=ControlBit.ENABLE, force_setpoint_n=force_n, mode=Mode.FORCE,
+            "enable", control_word=self.enabling, force_setpoint_n=force_n, mode=Mode.FORCE,
             heartbeat=(rig.command.heartbeat + 1) % 1000,
         )  # fmt: skip
         self._run(self.draw.choice((0.2, 0.6, 1.5)))
@@ -137,13 +153,12 @@ class Scene:
         if not self._write("force", force_setpoint_n=force_n):
             return
         if is_held and rig.machine.touches:
-            slack_n = judge.noise_n + 0.2
             if force_n < was_n - 1.0:
-                judge.bound(top_n + slack_n, "a lowered setpoint")
+                judge.bound(top_n + judge.slip_n, "a lowered setpoint")
             elif force_n > was_n + 2.0:
                 standing_n = max(force_n - judge.bias_n, judge.standing_n(force_n, max(0.0, trim_v)))
                 lead = self._lead_share()
-                top_n = standing_n + (OVERSHOOT_SHARE + lead) * (standing_n - min(before_n, was_n)) + slack_n
+                top_n = standing_n + (OVERSHOOT_SHARE + lead) * (standing_n - min(before_n, was_n)) + judge.slip_n
                 judge.bound(top_n, "an overshoot")
         self._run(self.draw.choice((0.3, 1.0, 1.0, 2.0, 2.0, judge.settling_s() + 0.5)))
 
@@ -168,7 +183,11 @@ class Scene:
                 {"contact_ramp_s": draw.choice((0.1, 1.0))},
             )
         )
+        before = self.rig.last
         self._write("changes", **changes)
+        after, held = self.rig.last, StatusBit.IN_BAND | StatusBit.ENABLED
+        if before.status & after.status & held == held and abs(after.voltage_v - before.voltage_v) > BUMP_V:
+            self.judge.complain(f"{before.voltage_v:.3f} V become {after.voltage_v:.3f} V by {changes}")
 
     def _sine(self) -> None:
         """A master that writes a path."""

@@ -118,6 +118,43 @@ def test_noise_does_not_hide_a_force_that_is_off_and_makes_none_of_one_that_is_n
     assert (check.unreachable, check.in_band) == (is_unreachable, False)
 
 
+@pytest.mark.parametrize("in_band_time_s", [0.0, 0.02])
+def test_a_reading_now_and_then_that_is_in_the_band_hides_no_force_that_is_off(in_band_time_s: float) -> None:
+    """2.2 N too much, and every few dozen readings one within the band of 1.5 N: in_band was said, and nothing told."""
+    check, seen = SettlingCheck(UNREACHABLE_S), []
+    for k in range(1000):
+        contact_n = 10.9 if k % 50 > 46 else 12.0
+        reading = Reading(contact_n=contact_n, interval_s=0.01, is_new=True, is_usable=True)
+        check.judge_force(demand(in_band_time_s=in_band_time_s), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+        seen.append((check.in_band, check.unreachable))
+    assert (True, False) in seen[:200], "a reading within the band is in it as long as the target is not given up"
+    assert set(seen[201:]) == {(False, True)}
+
+
+@pytest.mark.parametrize("in_band_time_s", [0.0, 0.1])
+def test_a_force_that_comes_back_is_in_band_before_its_mean_is(in_band_time_s: float) -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(330):
+        reading = Reading(contact_n=10.0 if k >= 300 else 0.0, interval_s=0.01, is_new=True, is_usable=True)
+        check.judge_force(demand(in_band_time_s=in_band_time_s), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+        assert not (check.in_band and check.unreachable)
+    assert check.unreachable
+    for k in (330, 331):
+        check.judge_force(demand(in_band_time_s=in_band_time_s), at(0.01 * k), 10.0, 10.0)
+    assert check.in_band and not check.unreachable
+
+
+@pytest.mark.parametrize(("held_back_n", "is_unreachable"), [(0.0, False), (2.0, True)])
+def test_a_target_that_is_taken_back_again_and_again_is_missed(held_back_n: float, is_unreachable: bool) -> None:
+    """Of a machine 2.4 times as strong behind a cell of 5 Hz: each rise was held back, for good, and nothing told."""
+    check = SettlingCheck(UNREACHABLE_S)
+    for k in range(1000):
+        applied_n = 4.0 + 0.01 * (k % 50) if held_back_n else 4.0 + 0.01 * k
+        goal_n = held_back_n if held_back_n and k % 50 > 25 else 40.0
+        check.judge_force(demand(40.0, ramp_n_per_s=1.0), at(0.01 * k, applied_n), goal_n, applied_n)
+    assert check.unreachable is is_unreachable
+
+
 def test_what_has_gone_along_with_a_ramp_still_has_to_be_held_at_its_end() -> None:
     check, slow = SettlingCheck(UNREACHABLE_S), demand(ramp_n_per_s=1.0)
     for now_s in (0.0, 1.0):
@@ -191,6 +228,18 @@ def test_a_force_whose_single_readings_leave_the_band_is_noisy_and_one_that_must
     assert not check.is_noisy, "another setpoint waits anew"
     check.restart()
     assert not check.is_noisy
+
+
+@pytest.mark.parametrize(("inside", "is_noisy"), [(4, True), (16, False)])
+def test_moments_in_the_band_do_not_hide_that_the_force_leaves_it_most_of_the_time(inside: int, is_noisy: bool) -> None:
+    """A cell of 0.7 N rms and a band of 1 N: in_band came and went four times a second, and nothing was told for good."""
+    check, seen = SettlingCheck(UNREACHABLE_S), []
+    for k in range(2000):
+        off_n = 0.0 if k % 20 < inside else 1.5 * (-1) ** k
+        reading = Reading(contact_n=10.0 + off_n, is_new=True, is_usable=True, interval_s=0.01)
+        check.judge_force(demand(in_band_time_s=0.02), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
+        seen.append((check.in_band, check.is_noisy))
+    assert (True, is_noisy) in seen[1000:] and {noisy for _, noisy in seen[1000:]} == {is_noisy}
 
 
 def test_a_restart_forgets_how_long_single_readings_have_left_the_band() -> None:

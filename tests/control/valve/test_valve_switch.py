@@ -73,18 +73,20 @@ def test_a_pulling_valve_is_waited_for_only_where_the_rig_has_it_rest_elsewhere(
     assert switch.is_pulling and switch.is_going_to_rest is waits
 
 
-def test_each_time_of_a_switch_is_kept_to_the_step() -> None:
-    """Without pressure for the dwell, then told; once read back and told for the dwell, in effect."""
+@pytest.mark.parametrize("reads_back_s", [0.0625, 0.1875, 0.375])
+def test_each_time_of_a_switch_is_kept_to_the_step(reads_back_s: float) -> None:
+    """Without pressure for the dwell, then told; read back for the dwell, in effect. The second dwell was counted from the
+    order: a valve that took as long to come had its pressure with its readback."""
     switch = ValveSwitch(ValveControl(pull_area_share=0.75, dwell_s=0.25, timeout_s=0.5))
     told_at, turned_at = [], []
     for k in range(20):
         now_s = 0.0625 * k
-        stands = PULL if switch.commanded is PULL else PUSH
+        stands = PULL if told_at and now_s - told_at[0] >= reads_back_s else PUSH
         if switch.step(now_s, PULL, ValveStatus(stands), is_vented=True):
             turned_at.append(now_s)
         if switch.commanded is PULL:
             told_at.append(now_s)
-    assert (told_at[0], turned_at) == (0.25, [0.5])
+    assert (told_at[0], turned_at) == (0.25, [0.25 + reads_back_s + 0.25])
 
 
 @pytest.mark.parametrize("status", [ValveStatus(PULL), ValveStatus(PUSH, unanswered_since_s=0.0)])
