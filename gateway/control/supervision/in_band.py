@@ -64,6 +64,24 @@ class InBandTimer:
         self._in_since_s = inf
 
 
+class _Approach:
+    """How long ago a target has last come nearer to its setpoint than ever before."""
+
+    def __init__(self) -> None:
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        self._setpoint_n, self._least_n, self._since_s = nan, inf, -inf
+
+    def is_held_back(self, now_s: float, setpoint_n: float, applied_n: float, tolerance_n: float) -> bool:
+        """Decide it once more. What has been held back goes on again where it comes nearer by the tolerance, not by less."""
+        left_n = abs(setpoint_n - applied_n)
+        nearer_n = tolerance_n if now_s - self._since_s > _RAMP_LATE_S else 0.0
+        if setpoint_n != self._setpoint_n or left_n < self._least_n - nearer_n:
+            self._setpoint_n, self._least_n, self._since_s = setpoint_n, left_n, now_s
+        return now_s - self._since_s > _RAMP_LATE_S
+
+
 class SettlingCheck:
     """Decides which event of the state table a step of the force loop is. Times are monotonic seconds.
 
@@ -78,11 +96,7 @@ class SettlingCheck:
         self._smooth_n: float | None = None  # contact force behind a low-pass, None where it begins anew
         self._noisy_s = 0.0  # so much longer neither in band nor unreachable than in band
         self._judged_s, self.is_noisy = inf, False
-        self._towards_n, self._left_n, self._nearer_s = (
-            nan,
-            inf,
-            -inf,
-        )  # setpoint, least distance of the target to it, when
+        self._approach = _Approach()
         self._driven_v: float | None = None  # that the band is of; None: it is of a force, or of nothing
 
     @property
@@ -111,7 +125,7 @@ class SettlingCheck:
         self._band.restart()
         self._answer.restart()
         self._driven_v = self._smooth_n = None
-        self._towards_n = nan
+        self._approach.begin_anew()
         self._wait_anew()
 
     def judge_force(self, demand: Demand, inputs: LoopInputs, goal_n: float, applied_n: float) -> StateEvent:
@@ -167,13 +181,9 @@ class SettlingCheck:
     def _follow_ramp(self, demand: Demand, inputs: LoopInputs, applied_n: float) -> None:
         if not inputs.touching:
             self._band.restart()
-            self._towards_n = nan
+            self._approach.begin_anew()
             return
-        left_n, was_held_back = abs(demand.force_n - applied_n), inputs.now_s - self._nearer_s > _RAMP_LATE_S
-        nearer_n = demand.manner.tolerance_n if was_held_back else 0.0
-        if demand.force_n != self._towards_n or left_n < self._left_n - nearer_n:
-            self._towards_n, self._left_n, self._nearer_s = demand.force_n, left_n, inputs.now_s
-        is_held_back = inputs.now_s - self._nearer_s > _RAMP_LATE_S
+        is_held_back = self._approach.is_held_back(inputs.now_s, demand.force_n, applied_n, demand.manner.tolerance_n)
         most_n = _RAMP_BANDS * demand.manner.tolerance_n + _RAMP_LATE_S * demand.manner.ramp_n_per_s
         is_near = abs(inputs.reading.contact_n - applied_n) <= most_n
         self._band.go_along(inputs.now_s, is_near and not is_held_back)

@@ -109,9 +109,7 @@ class HeldEnables:
         self._lost_now: dict[str, list[int]] = {}
         self._let_go_s: dict[str, float] = {}  # when somebody on the host of one of the lost has written enable as 0
         self.frames = FrameBeats()
-        self._refused: dict[
-            tuple[str, bool], _Refused
-        ] = {}  # of each host the start refused last; its last tare, if True
+        self._refused: dict[tuple[str, bool], _Refused] = {}  # of each host its last refused start; True: its last tare
         self._told_s = 0.0
         self._ahead: Command | None = None  # whose heartbeat is noted later
         self._is_moving = False  # it was another one than in the command before
