@@ -21,9 +21,9 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.audit.audit_file import HEAD
-from gateway.plain_file import check_plain, open_plain_stream, replaced_by
+from gateway.plain_file import check_plain, open_plain_stream
 from gateway.processes import state_lock
-from gateway.processes.durable_file import sync_path
+from gateway.processes.durable_file import replacing_file, sync_path
 from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING
 
 _MANIFEST: Final = "backup.json"
@@ -46,25 +46,16 @@ _DAMAGE: Final = (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, Valu
 def pack_state(state: Path, target: Path) -> list[str]:
     """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
     files: list[Path] = []
-    target = replaced_by(target)
-    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
-        beside = Path(stream.name)
-        try:
-            with (
-                gzip.GzipFile(fileobj=stream, mode="wb", mtime=0) as packed,  # of a clock beyond 2106 it has no room
-                tarfile.open(fileobj=packed, mode="w", dereference=True) as archive,  # a second name is a file, too
-            ):
-                _add_manifest(archive, state)
-                for path in (path for path in _files(state) if _is_kept(path, state)):
-                    with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
-                        _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
-                        files.append(path)
-            stream.flush()
-            os.fsync(stream.fileno())
-            beside.replace(target)
-            sync_path(target.parent)
-        finally:
-            beside.unlink(missing_ok=True)
+    with (
+        replacing_file(target, _OWNER_READS) as stream,
+        gzip.GzipFile("", "wb", fileobj=stream, mtime=0) as packed,  # of a clock beyond 2106 it has no room
+        tarfile.open(fileobj=packed, mode="w", dereference=True) as archive,  # a second name is a file, too
+    ):
+        _add_manifest(archive, state)
+        for path in (path for path in _files(state) if _is_kept(path, state)):
+            with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
+                _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
+                files.append(path)
     return [str(path.relative_to(state)) for path in files if not path.is_dir()]
 
 

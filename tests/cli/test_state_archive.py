@@ -2,6 +2,7 @@
 
 import io
 import os
+import stat
 import tarfile
 from pathlib import Path
 
@@ -31,10 +32,13 @@ def test_a_backup_is_on_the_disk_before_it_has_its_name(
     state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target, synced = tmp_path / "b.tar.gz", list[tuple[str, bool]]()
-    monkeypatch.setattr(state_archive.os, "fsync", lambda descriptor: synced.append(("file", target.exists())))
-    monkeypatch.setattr(state_archive, "sync_path", lambda path: synced.append((path.name, target.exists())))
+
+    def note(descriptor: int) -> None:
+        synced.append(("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file", target.exists()))
+
+    monkeypatch.setattr(os, "fsync", note)
     pack_state(state, target)
-    assert synced == [("file", False), (tmp_path.name, True)]
+    assert synced == [("file", False), ("folder", True)]
 
 
 def test_what_is_restored_is_on_the_disk_before_it_is_the_state(

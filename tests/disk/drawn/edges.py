@@ -10,7 +10,7 @@ import pytest
 from gateway.processes import durable_file
 from gateway.recording import recorder
 from gateway.recording.care import keeping
-from tests.disk.drawn.recording_player import RecordingPlayer, row_of
+from tests.disk.drawn.players.recording_player import RecordingPlayer, row_of
 from tests.disk.drawn.workers import DrawnWorker
 
 if TYPE_CHECKING:
@@ -60,5 +60,5 @@ def _watch_recordings(player: RecordingPlayer, patch: pytest.MonkeyPatch) -> Non
 
     patch.setattr(f"{_ROOM}.run_recording.row_of", row_of)
     patch.setattr(f"{_ROOM}.run_recording.sync_recording", watched_sync)
-    for module in (f"{_ROOM}.retention", "tests.disk.drawn.recording_player"):
+    for module in (f"{_ROOM}.retention", "tests.disk.drawn.players.recording_player"):
         patch.setattr(f"{module}.prune_recordings", watched_prune)

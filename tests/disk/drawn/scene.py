@@ -11,7 +11,7 @@ from typing import Final
 from tests.disk.drawn.drawn_disk import GATEWAY, VERB, DrawnDisk
 from tests.disk.drawn.edges import edges_of
 from tests.disk.drawn.people import People
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 from tests.disk.drawn.workers import DrawnWorker
 from tests.disk.watched_disk import watching
 
@@ -22,13 +22,15 @@ _MOST_WORK: Final = 300
 
 
 class Scene:
-    """now_s: monotonic; wall_s: of the epoch; said: what the gateway has told; broken: the laws that did not hold."""
+    """now_s: monotonic; wall_s: of the epoch; said: what the gateway has told; broken: the laws that did not hold; outside: a
+    folder of people's on the same disk; unseen: one that no scene's disk has."""
 
     def __init__(self, seed: int, folder: Path, kinds: list[type[Player]]) -> None:
         self.rng = Random(seed)
-        self.state = folder / "state"
-        self.state.mkdir()
-        self.disk = DrawnDisk(self.state)
+        self.unseen, root = folder, folder / "disk"
+        self.state, self.outside = root / "state", root / "outside"
+        self.state.mkdir(parents=True), self.outside.mkdir()
+        self.disk = DrawnDisk(root)
         self.now_s, self.wall_s = 1000.0, _BEGAN_S
         self.said: list[str] = []
         self.trace: list[str] = []
@@ -99,7 +101,7 @@ class Scene:
             (3, self._heal),
             (2, self._act_beside),
             (2, self._act_and_kill),
-            (1, self._lose_power),
+            (1, self.lose_power),
             (1, self._turn_clock),
             (1, self._meddle),
         ]
@@ -138,7 +140,7 @@ class Scene:
             player.tick()
 
     def _refuse(self) -> None:
-        places = ["", "", *(folder for player in self.players for folder in player.folders)]
+        places = ["", "", *(folder.rstrip("*") for player in self.players for folder in player.folders)]
         self.note(self.disk.refuse(self.rng, places))
 
     def _heal(self) -> None:
@@ -171,7 +173,8 @@ class Scene:
         self.disk.kill_in(rng.choice([0, 1, 2, 3, 5, 8, 13, 21]), rng.choice([0.0, 0.5, 1.0]))
         rng.choice([self._act, self._act, self.go_on])()
 
-    def _lose_power(self) -> None:
+    def lose_power(self) -> None:
+        """Cut it; then a gateway starts."""
         for player in self.players:
             player.die()
         self.note(f"power cut: {self.disk.cut_power(self.rng)}")
@@ -232,7 +235,7 @@ class Scene:
     def _close(self) -> None:
         with self.disk.aside():
             for player in self.players:
-                player.die()
+                player.die(), player.close()
         DrawnWorker.all.clear()
 
     def _touch_times(self) -> None:
@@ -249,5 +252,5 @@ class Scene:
 
 def clean(folder: Path) -> None:
     """Make room for the next scene."""
-    for name in ("state", "elsewhere"):
+    for name in ("disk", "elsewhere"):
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.disk.drawn.audit_player import AuditPlayer
-from tests.disk.drawn.player import Player
-from tests.disk.drawn.recording_player import RecordingPlayer
+from tests.disk.drawn.players.audit_player import AuditPlayer
+from tests.disk.drawn.players.own_words import EventsPlayer, MarkerPlayer
+from tests.disk.drawn.players.player import Player
+from tests.disk.drawn.players.recording_player import RecordingPlayer
+from tests.disk.drawn.players.small_players import CounterPlayer, Onlooker, ReferencePlayer, Terminal
+from tests.disk.drawn.players.store_player import CalibrationPlayer, PlantPlayer
+from tests.disk.drawn.players.value_players import FilePlayer, ForceReferencePlayer, SettingsPlayer
 from tests.disk.drawn.scene import Scene, clean
-from tests.disk.drawn.small_players import CounterPlayer, Onlooker, ReferencePlayer, Terminal
-from tests.disk.drawn.store_player import CalibrationPlayer, PlantPlayer
 
+SMALL: list[type[Player]] = [EventsPlayer, MarkerPlayer, SettingsPlayer, ForceReferencePlayer, FilePlayer]
 EVERY: list[type[Player]] = [
     AuditPlayer,
     CalibrationPlayer,
@@ -22,12 +25,15 @@ EVERY: list[type[Player]] = [
     ReferencePlayer,
     CounterPlayer,
     Onlooker,
+    *SMALL,
 ]
 COUNTS: dict[str, tuple[list[type[Player]], int]] = {
     "audit": ([AuditPlayer], 25),
     "calibrations": ([CalibrationPlayer], 25),
     "recordings": ([RecordingPlayer], 30),
     "reference": ([ReferencePlayer], 25),
+    "events": ([EventsPlayer], 25),
+    "small": (SMALL, 25),
     "all": (EVERY, 25),
     "verbs": ([Terminal, Terminal, *EVERY], 6),
 }

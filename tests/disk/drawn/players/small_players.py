@@ -22,9 +22,9 @@ from gateway.watch.reference_recording import (
     read_reference_recording,
     reference_path,
 )
-from tests.disk.drawn.audit_player import AuditPlayer
-from tests.disk.drawn.player import Player
-from tests.disk.drawn.store_player import BUILT_IN, StorePlayer
+from tests.disk.drawn.players.audit_player import AuditPlayer
+from tests.disk.drawn.players.player import Player
+from tests.disk.drawn.players.store_player import BUILT_IN, StorePlayer
 
 
 class ReferencePlayer(Player):
@@ -35,7 +35,7 @@ class ReferencePlayer(Player):
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
         self.possible = {""}
-        self.sources = self.state.parent / "sources"
+        self.sources = scene.unseen / "sources"
         self.sources.mkdir(exist_ok=True)
 
     def act(self) -> None:
@@ -115,7 +115,7 @@ class Onlooker(Player):
         self.rng.choice([self._back_up, self._back_up, self._bundle])()
 
     def _back_up(self) -> None:
-        archive, copy = self.state.parent / "kept.tar.gz", self.state.parent / "copy"
+        archive, copy = self.scene.unseen / "kept.tar.gz", self.scene.unseen / "copy"
         stored = {type(one): set(one.documents) for one in self.scene.players if isinstance(one, StorePlayer)}
         synced = {one for each in self.scene.players if isinstance(each, AuditPlayer) for one in each.synced}
         try:
@@ -151,7 +151,7 @@ class Onlooker(Player):
         for text in parts.values():
             if "[Errno" in text or "Traceback" in text:
                 self.complain(f"a bundle's part without a sentence: {text[:200]}")
-        pack_bundle(parts, self.state.parent / "report.tar.gz")
+        pack_bundle(parts, self.scene.unseen / "report.tar.gz")
 
     def judge(self) -> None: ...
 

@@ -40,6 +40,9 @@ class Player(ABC):
     def die(self) -> None:  # noqa: B027
         """The gateway was killed."""
 
+    def close(self) -> None:  # noqa: B027
+        """The scene has ended."""
+
     def lose_power(self) -> None:  # noqa: B027
         """What was not synced may be gone."""
 

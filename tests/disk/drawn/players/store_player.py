@@ -8,7 +8,7 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import NumberedStore, StoreError
 from gateway.plants.store import PlantStore
 from tests.calibrations.coefficients import calibration
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 from tests.plants.test_plant_store import numbered
 
 BUILT_IN = calibration(0, number=1000)

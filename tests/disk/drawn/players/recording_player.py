@@ -16,8 +16,8 @@ from gateway.recording.label import RecordingLabel
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.watch.reference_recording import read_reference_recording
-from tests.disk.drawn.player import Player
-from tests.disk.drawn.recording_laws import broken_rows, spared
+from tests.disk.drawn.players.player import Player
+from tests.disk.drawn.players.recording_laws import broken_rows, spared
 from tests.service.rigs import demo
 
 FORCE = COLUMNS.index("force_n")

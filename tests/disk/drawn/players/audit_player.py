@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_log import MOST_WAITING, AuditLog
 from gateway.audit.audit_reader import read_audit, verify_audit
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 
 
 class NotedAuditLog(AuditLog):
