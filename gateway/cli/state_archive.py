@@ -6,13 +6,13 @@ archive changes nothing; what was there before is kept under another name, not d
 """
 
 import contextlib
+import errno
 import gzip
 import io
 import json
 import os
 import shutil
 import tarfile
-import tempfile
 import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -23,7 +23,7 @@ from gateway import VERSION
 from gateway.audit.audit_file import HEAD
 from gateway.plain_file import check_plain, open_plain_stream
 from gateway.processes import state_lock
-from gateway.processes.durable_file import replacing_file, sync_path
+from gateway.processes.durable_file import lock_directory, make_path, replacing_file, sync_path
 from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING
 
 _MANIFEST: Final = "backup.json"
@@ -80,9 +80,8 @@ def unpack_state(source: Path, state: Path) -> Path | None:
     none."""
     names_in(source)
     state = state.resolve()  # by a link it is on another disk, and stays there
-    state.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(tempfile.mkdtemp(dir=state.parent, prefix=f".{state.name}."))
-    try:
+    make_path(state.parent, 0o777)
+    with _beside(state) as beside:
         with _damage_told(source), tarfile.open(source, "r:gz") as archive:
             _extract(archive, beside)
         fresh = beside / _TOP
@@ -91,8 +90,23 @@ def unpack_state(source: Path, state: Path) -> Path | None:
         _give_to_owner(fresh, state if state.exists() else state.parent)
         _sync_all(fresh)
         return _put_in_place(fresh, state)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _beside(state: Path) -> Iterator[Path]:
+    """Yield an empty directory beside the state, gone behind the block. It has one name, so that what a killed restore has
+    left, a whole state, goes with the next one; while another restore is at work on it, OSError."""
+    beside = state.with_name(f".{state.name}.restored")
+    with contextlib.suppress(FileNotFoundError), lock_directory(beside):
+        shutil.rmtree(beside)
+    beside.mkdir(mode=0o700)
+    with lock_directory(beside) as descriptor:
+        if not os.path.samestat(os.fstat(descriptor), beside.stat()):
+            raise OSError(errno.EBUSY, "another restore is at work there", str(state))
+        try:
+            yield beside
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
 
 
 def _extract(archive: tarfile.TarFile, folder: Path) -> None:

@@ -66,7 +66,7 @@ def _lock(descriptor: int, directory: Path, *, shared: bool) -> None:
 def make_directory(directory: Path) -> None:
     """Make the directory, durably. OSError, and it is not there unless it was before, when that fails. The name of one that is
     there may not be on the disk yet: who made it was killed, or is at it now."""
-    directory.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    make_path(directory.parent)
     try:
         directory.mkdir(mode=0o700)
     except FileExistsError:
@@ -79,6 +79,15 @@ def make_directory(directory: Path) -> None:
         with contextlib.suppress(OSError):
             directory.rmdir()
         raise
+
+
+def make_path(directory: Path, mode: int = 0o700) -> None:
+    """Make the directory and those above it, and have the names of those that were made on the disk: what is stored durably in
+    one whose own name is lost is lost with it. OSError where that is refused; some may be there then."""
+    made = [each for each in (directory, *directory.parents) if not each.exists()]
+    directory.mkdir(parents=True, exist_ok=True, mode=mode)
+    for each in made:
+        sync_path(each.parent)
 
 
 def _make_owner_s(directory: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from gateway.cli import state_archive
 from gateway.cli.state_archive import ArchiveError, names_in, pack_state, unpack_state
+from gateway.processes.durable_file import lock_directory
 
 
 def archive_of(path: Path, manifest: bytes, *names: str) -> Path:
@@ -39,6 +40,28 @@ def test_a_backup_is_on_the_disk_before_it_has_its_name(
     monkeypatch.setattr(os, "fsync", note)
     pack_state(state, target)
     assert synced == [("file", False), ("folder", True)]
+
+
+def test_what_a_killed_restore_has_left_goes_with_the_next_one(state: Path, tmp_path: Path) -> None:
+    """A whole state stayed behind each, and nobody's list showed it."""
+    pack_state(state, tmp_path / "b.tar.gz")
+    left = tmp_path / f".{state.name}.restored" / "state" / "recordings"
+    left.mkdir(parents=True)
+    (left / "0009.fgr").write_bytes(b"half of it")
+    before = unpack_state(tmp_path / "b.tar.gz", state)
+    assert before is not None
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["b.tar.gz", state.name, before.name])
+    assert not (state / "recordings").exists()
+
+
+def test_two_restores_at_once_mix_nothing(state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pack_state(state, tmp_path / "b.tar.gz")
+    monkeypatch.setattr("gateway.processes.durable_file._WRITER_BOUND_S", 0.0)
+    at_work = tmp_path / f".{state.name}.restored"
+    at_work.mkdir()
+    with lock_directory(at_work), pytest.raises(OSError, match="locked"):
+        unpack_state(tmp_path / "b.tar.gz", state)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([at_work.name, "b.tar.gz", state.name])
 
 
 def test_what_is_restored_is_on_the_disk_before_it_is_the_state(

@@ -70,6 +70,17 @@ def test_what_is_stored_in_a_folder_whose_maker_was_killed_outlives_a_power_cut(
         assert CalibrationStore(fast_folder / mode).numbers() == [number]
 
 
+def test_what_is_stored_in_a_state_directory_that_is_made_for_it_outlives_a_power_cut(fast_folder: Path) -> None:
+    """Of a fresh rig neither it nor the folder of all rigs is there."""
+    (home := fast_folder / "home").mkdir()
+    disk = JournaledDisk(home)
+    with watching(disk):
+        number = CalibrationStore(home / "force-gateway" / "demo").add(calibration(1))
+    for mode, tree in disk.states(len(disk.changes), 0):
+        tree.write_to(fast_folder / mode)
+        assert CalibrationStore(fast_folder / mode / "force-gateway" / "demo").numbers() == [number], mode
+
+
 class FirstAuditedWrite(AuditedWrites):
     BATCHES = 1
 

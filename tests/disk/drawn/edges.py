@@ -17,7 +17,12 @@ if TYPE_CHECKING:
     from tests.disk.drawn.scene import Scene
 
 _ROOM: Final = "gateway.service.running_rig.recording"
-_WITH_THREADS: Final = ("gateway.audit.audit_log", f"{_ROOM}.recordings", f"{_ROOM}.retention")
+_WITH_THREADS: Final = (
+    "gateway.audit.audit_log",
+    "gateway.calibrations.upload",
+    f"{_ROOM}.recordings",
+    f"{_ROOM}.retention",
+)
 
 
 class LockClock:

@@ -7,16 +7,19 @@ from pathlib import Path
 
 import pytest
 
+from tests.disk.drawn.players.archive_player import ArchivePlayer
 from tests.disk.drawn.players.audit_player import AuditPlayer
 from tests.disk.drawn.players.own_words import EventsPlayer, MarkerPlayer
 from tests.disk.drawn.players.player import Player
 from tests.disk.drawn.players.recording_player import RecordingPlayer
 from tests.disk.drawn.players.small_players import CounterPlayer, Onlooker, ReferencePlayer, Terminal
 from tests.disk.drawn.players.store_player import CalibrationPlayer, PlantPlayer
+from tests.disk.drawn.players.upload_player import UploadPlayer
 from tests.disk.drawn.players.value_players import FilePlayer, ForceReferencePlayer, SettingsPlayer
 from tests.disk.drawn.scene import Scene, clean
 
 SMALL: list[type[Player]] = [EventsPlayer, MarkerPlayer, SettingsPlayer, ForceReferencePlayer, FilePlayer]
+LARGE: list[type[Player]] = [ArchivePlayer, UploadPlayer]
 EVERY: list[type[Player]] = [
     AuditPlayer,
     CalibrationPlayer,
@@ -26,12 +29,15 @@ EVERY: list[type[Player]] = [
     CounterPlayer,
     Onlooker,
     *SMALL,
+    *LARGE,
 ]
 COUNTS: dict[str, tuple[list[type[Player]], int]] = {
     "audit": ([AuditPlayer], 25),
     "calibrations": ([CalibrationPlayer], 25),
     "recordings": ([RecordingPlayer], 30),
     "reference": ([ReferencePlayer], 25),
+    "archives": ([ArchivePlayer], 10),
+    "uploads": ([UploadPlayer], 15),
     "events": ([EventsPlayer], 25),
     "small": (SMALL, 25),
     "all": (EVERY, 25),
