@@ -244,11 +244,8 @@ def _is_left_out(parent: str, name: str) -> bool:
 
 
 def _set_aside(state: Path) -> Path | None:
-    """Rename what is there; an empty directory is simply removed."""
-    if not state.exists():
-        return None
-    if not any(state.iterdir()):
-        state.rmdir()
+    """Rename what is there; an empty directory stays, for another one may take its name."""
+    if not state.exists() or not any(state.iterdir()):
         return None
     number = 1
     while (previous := state.with_name(f"{state.name}.before-restore-{number}")).exists():

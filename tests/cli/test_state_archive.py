@@ -1,5 +1,6 @@
 """An archive by itself: on the disk before it has its name, its content before it is the state, and checked both ways."""
 
+import errno
 import io
 import os
 import stat
@@ -125,6 +126,24 @@ def test_only_the_gateway_s_own_files_are_left_out(state: Path, tmp_path: Path) 
         (folder / "lock").touch()
         (folder / "running").touch()
     assert pack_state(state, tmp_path / "b.tar.gz")[1:] == ["calibrations/lock", "calibrations/running"]
+
+
+def test_a_restore_that_is_refused_leaves_an_empty_directory_where_it_was(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pack_state(state, tmp_path / "b.tar.gz")
+    (empty := tmp_path / "empty").mkdir()
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as failing:
+        failing.setattr(os, "rename", refuse)
+        with pytest.raises(OSError, match="Input/output"):
+            unpack_state(tmp_path / "b.tar.gz", empty)
+    assert empty.is_dir()
+    assert unpack_state(tmp_path / "b.tar.gz", empty) is None
+    assert (empty / "calibrations" / "0001.yaml").read_text() == "name: one\n"
 
 
 def test_an_empty_state_comes_back_empty(tmp_path: Path) -> None:

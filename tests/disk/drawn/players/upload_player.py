@@ -45,6 +45,8 @@ class UploadPlayer(Player):
         self.slots: dict[int, set[int]] = {slot: set() for slot in SLOTS}
         self.marks = {0}
         self.asked: tuple[int | None, int | None] | None = None
+        self.before = self.possible, self.slots
+        self.is_known = True
         self.bench: Bench | None = None
 
     def begin(self) -> None:
@@ -53,8 +55,8 @@ class UploadPlayer(Player):
         self.bench.upload.run_in_background = self.bench.upload._thread
         self.bench.upload.on_failure = self._on_failure
         self.bench.upload.on_use = self._on_use
-        self.asked = None
-        if not self.disk.refused and not self.is_touched:
+        self.asked, self.is_known = None, not self.disk.refused and not self.is_touched and self.disk.is_well
+        if self.is_known:
             self._judge_active(f"behind a start, {self.bench.selected.notes}")
 
     def _active(self) -> int | None:
@@ -69,6 +71,8 @@ class UploadPlayer(Player):
 
     def act(self) -> None:
         assert self.bench
+        if self.asked is None:
+            self.before = set(self.possible), {slot: set(marks) for slot, marks in self.slots.items()}
         try:
             self.rng.choice([self._upload, self._upload, self._upload, self._select, self._roll_back])()
         except Refusal as refusal:
@@ -114,7 +118,7 @@ class UploadPlayer(Player):
         assert self.bench
         slot = self.rng.choice(SLOTS)
         self.bench.write(register_map().find(SELECT).address, slot)
-        if not self.slots[slot]:
+        if not self.slots[slot] and not self.is_touched:
             self.complain(f"slot {slot} was never filled, and is selected")
         self.asked = (min(self.slots[slot]), slot) if len(self.slots[slot]) == 1 else (None, slot)
         self.possible |= self.slots[slot]
@@ -137,7 +141,8 @@ class UploadPlayer(Player):
         self.scene.note(f"in use: {active}, asked was {asked}")
         if asked is None or (asked[0] is not None and asked[0] != active):
             self.complain(f"{active} is in use, asked was {asked}")
-        self.possible = {active} if active is not None else set()
+        if active is not None:
+            self.possible = {active}
         if asked and asked[0] is not None and asked[1] is not None:
             self.slots[asked[1]] = {asked[0]}
         self.asked = None
@@ -145,11 +150,9 @@ class UploadPlayer(Player):
     def _on_failure(self, what: str, sentence: str) -> None:
         self.scene.note(f"failed: {what}: {sentence}")
         self.judge_words(sentence)
-        active = self._active()
-        if len(self.disk.refused) < 2 and not any(call.what == "fsync" for call in self.disk.refused):
-            if self.asked and self.asked[1] is not None and self.asked[0] is not None and self.asked[0] != active:
-                self.slots[self.asked[1]] -= {self.asked[0]}
-            self.possible = {active} if active is not None else self.possible
+        is_undone = len(self.disk.refused) < 2 and not any(call.what == "fsync" for call in self.disk.refused)
+        if is_undone and self.asked:
+            self.possible, self.slots = self.before
         self.asked = None
 
     def die(self) -> None:
@@ -157,7 +160,7 @@ class UploadPlayer(Player):
 
     def judge(self) -> None:
         assert self.bench
-        if self.asked is None and not self.is_touched:
+        if self.asked is None and self.is_known:
             self._judge_active("while it runs")
         if not self.disk.is_well or self.is_touched:
             return
