@@ -134,7 +134,7 @@ def replacing_file(target: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
     """Yield a stream for a file of people's: behind the block, durably, it stands in place of the one that may be there.
     OSError, and what was there stays; only where the folder's fsync alone is refused is the new one there. mode: as of open."""
     target = replaced_by(target)
-    beside, descriptor = _open_beside(target, mode)
+    beside, descriptor = open_beside(target, mode)
     with open(beside, "wb", opener=lambda name, flags: descriptor) as stream:
         try:
             yield stream
@@ -147,8 +147,9 @@ def replacing_file(target: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
     sync_path(target.parent)
 
 
-def _open_beside(target: Path, mode: int) -> tuple[Path, int]:
-    """A file that nobody else writes: the first whose lock is free, empty. One that a killed process has left is used again."""
+def open_beside(target: Path, mode: int) -> tuple[Path, int]:
+    """Return path and descriptor of an empty file beside a target that nobody else writes: the first whose lock is free. One
+    that a killed process has left is used again. OSError where there is none."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
     for number in count():
         beside = target.with_name(f".{target.name}.{number}{_BESIDE}")

@@ -17,6 +17,8 @@ from tests.disk.watched_disk import watching
 
 _BEGAN_S: Final = 1.7e9
 _UNFIT: Final = ("[Errno", "Traceback", "internal error", "None", "Error(")
+_BESIDE: Final = (".new", ".part")
+_HIDDEN: Final = frozenset((".summaries.json",))
 DAY_S: Final = 86400.0
 _MOST_WORK: Final = 300
 
@@ -226,11 +228,21 @@ class Scene:
                 player.judge_healed()
         if self.broken:
             return
+        self._judge_leftovers()
         self.note("another start")
         for player in self.players:
             player.die()
         self._begin_anew(is_killed=False)
         self._judge()
+
+    def _judge_leftovers(self) -> None:
+        """What is written beside a file has gone with the next that was."""
+        if any(player.is_touched for player in self.players):
+            return
+        with self.disk.aside():
+            names = [path.name for path in Path(self.disk.folder).rglob("*")]
+        if left := [name for name in names if name.endswith(_BESIDE) or (name[0] == "." and name not in _HIDDEN)]:
+            self.complain(f"{left} are left for ever")
 
     def _close(self) -> None:
         with self.disk.aside():

@@ -3,6 +3,7 @@
 A scene is one seed: which stores there are, what is done with them, and what befalls them. The laws are the players' own.
 """
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -51,8 +52,14 @@ def test_what_was_said_to_be_stored_is_there_and_all_heals_with_the_disk(
     fast_folder: Path, which: str, budget: int
 ) -> None:
     kinds, count = COUNTS[which]
-    broken = []
+    broken, opened = [], _descriptors()
     for seed in range(count * budget):
         broken += [(seed, words) for words in Scene(seed, fast_folder, kinds).run().broken]
         clean(fast_folder)
     assert broken == []
+    assert _descriptors() == opened, "of what was open behind each scene"
+
+
+def _descriptors() -> int:
+    gc.collect()  # what was killed is held by its traceback
+    return len(list(Path("/proc/self/fd").iterdir()))

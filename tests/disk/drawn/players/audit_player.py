@@ -126,6 +126,8 @@ class AuditPlayer(Player):
         """All of this life is there, or counted."""
         self.judge()
         assert self.log
+        self._put(1)
+        self.scene.go_on_all()
         if self.log._waiting or self.log._written or self.log._in_flight:
             self.complain(f"{len(self.log._waiting)} records still wait on a disk that is well")
         records = self._read()

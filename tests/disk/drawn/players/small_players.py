@@ -23,6 +23,7 @@ from gateway.watch.reference_recording import (
     reference_path,
 )
 from tests.disk.drawn.players.audit_player import AuditPlayer
+from tests.disk.drawn.players.own_words import SECRET
 from tests.disk.drawn.players.player import Player
 from tests.disk.drawn.players.store_player import BUILT_IN, StorePlayer
 
@@ -72,6 +73,15 @@ class ReferencePlayer(Player):
             self.complain(f"the reference {there[:6]} is none that was chosen: {[one[:6] for one in self.possible]}")
         self.possible = {there}
 
+    def judge_healed(self) -> None:
+        """Another one is taken."""
+        self.judge()
+        for _ in range(5):
+            self.act()
+        if len(self.possible) != 1:
+            self.complain(f"it takes none on a disk that is well: {self.possible} may be there")
+        self.judge()
+
 
 class CounterPlayer(Player):
     """told: numbers of births since the disk was last seen to refuse one."""
@@ -104,6 +114,12 @@ class CounterPlayer(Player):
         self.counter = None
 
     def judge(self) -> None: ...
+
+    def judge_healed(self) -> None:
+        """It counts on."""
+        self.act()
+        if self.last is None and not self.is_touched:
+            self.complain("a birth is not kept on a disk that is well")
 
 
 class Onlooker(Player):
@@ -147,7 +163,9 @@ class Onlooker(Player):
         return [found.get("calibrations"), found.get("plants")]
 
     def _bundle(self) -> None:
-        parts = collect_parts(self.state, lambda: [("rig.yaml", "name: demo\n")])
+        parts = collect_parts(self.state, lambda: [("rig.yaml", f"name: demo\nweb:\n  token: {SECRET}\n")])
+        if told := [name for name, text in parts.items() if SECRET in text]:
+            self.complain(f"a secret is in {told} of a bundle")
         for text in parts.values():
             if "[Errno" in text or "Traceback" in text:
                 self.complain(f"a bundle's part without a sentence: {text[:200]}")

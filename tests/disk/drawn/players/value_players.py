@@ -126,7 +126,6 @@ class FilePlayer(ValuePlayer):
     """Files for people, written by verbs and by the page: an export, a report, a bundle of what helps from afar."""
 
     KINDS: ClassVar = ("csv", "parquet", "text", "tar.gz")
-    SECRET: ClassVar = "s3cr3t"
 
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
