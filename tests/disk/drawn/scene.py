@@ -38,6 +38,7 @@ class Scene:
         self.trace: list[str] = []
         self.broken: list[str] = []
         self.lives = 0
+        self._is_power_going = False
         self.kept: set[str] = set()  # recordings that somebody keeps
         self.reference = ""
         DrawnWorker.all.clear(), DrawnWorker.raised.clear()
@@ -104,6 +105,8 @@ class Scene:
             (2, self._act_beside),
             (2, self._act_and_kill),
             (1, self.lose_power),
+            (1, self._act_and_lose_power),
+            (2, self._lose_power_amid),
             (1, self._turn_clock),
             (1, self._meddle),
         ]
@@ -121,6 +124,9 @@ class Scene:
             work()
         self.disk.forget_plans()
         self._touch_times()
+        if self.disk.dead and self._is_power_going:
+            self._is_power_going = False
+            self.lose_power()
         self.disk.dead.discard(VERB)
         if GATEWAY in self.disk.dead:
             self.note("killed")
@@ -174,6 +180,19 @@ class Scene:
         rng = self.rng
         self.disk.kill_in(rng.choice([0, 1, 2, 3, 5, 8, 13, 21]), rng.choice([0.0, 0.5, 1.0]))
         rng.choice([self._act, self._act, self.go_on])()
+
+    def _act_and_lose_power(self) -> None:
+        """Right behind what was said to be stored."""
+        self._act()
+        for _ in range(self.rng.choice([0, 2])):
+            self.go_on()
+        self.lose_power()
+
+    def _lose_power_amid(self) -> None:
+        """Between two calls of what is done next."""
+        self._is_power_going = True
+        self._act_and_kill()
+        self._is_power_going = False
 
     def lose_power(self) -> None:
         """Cut it; then a gateway starts."""

@@ -40,7 +40,8 @@ COUNTS: dict[str, tuple[list[type[Player]], int]] = {
     "archives": ([ArchivePlayer], 10),
     "uploads": ([UploadPlayer], 15),
     "events": ([EventsPlayer], 25),
-    "small": (SMALL, 25),
+    "files": ([FilePlayer], 25),
+    "small": (SMALL, 30),
     "all": (EVERY, 25),
     "verbs": ([Terminal, Terminal, *EVERY], 6),
 }

@@ -20,11 +20,15 @@ from tests.disk.drawn.players.player import Player
 
 
 class ValuePlayer(Player):
-    """possible: numbers of the values that may be there, 0 for none; durable: those that may be behind a power cut."""
+    """possible: numbers of the values that may be there, 0 for none; durable: those that may be behind a power cut.
+    has_one_writer: one process alone."""
+
+    has_one_writer: ClassVar = False
 
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
-        self.number = 0
+        self.number = self.under_way = 0
+        self.is_alone = True
         self.possible, self.durable = {0}, {0}
 
     def write(self, number: int) -> None:
@@ -37,7 +41,9 @@ class ValuePlayer(Player):
 
     def act(self) -> None:
         self.number += 1
-        number, before, changes = self.number, self.possible, self.number
+        self.under_way += 1
+        self.is_alone = self.under_way == 1
+        number, before = self.number, self.possible
         self.possible, self.durable = before | {number}, self.durable | {number}
         try:
             self.write(number)
@@ -47,15 +53,20 @@ class ValuePlayer(Player):
             is_undone = not any(
                 call.what in ("fsync", "open") for call in self.disk.refused
             )  # of the folder, at its end
-            if is_undone and self.number == changes:
+            if is_undone and self.is_alone:
                 self.possible, self.durable = before, self.durable - {number}
-            return
-        self.scene.note(f"{type(self).__name__} {number}: stored")
-        if self.number == changes:
-            self.possible = self.durable = {number}
+        else:
+            self.scene.note(f"{type(self).__name__} {number}: stored")
+            if self.is_alone:
+                self.possible = self.durable = {number}
+        finally:
+            self.under_way -= 1
 
     def verb(self) -> None:
-        """Somebody reads it meanwhile."""
+        """Somebody reads it meanwhile, or writes it, too."""
+        if not self.has_one_writer and self.rng.random() < 0.4:
+            self.act()
+            return
         self.disk.refused.clear()
         allowed = set(self.possible)
         try:
@@ -63,8 +74,8 @@ class ValuePlayer(Player):
         except OSError as refusal:
             self.judge_words(tell_place_and_refusal(refusal))
             return
-        if not self.disk.refused and self.disk.is_well and not self.is_touched and found not in allowed:
-            self.complain(f"{found} is read, {allowed} may be there")
+        if not self.disk.refused and self.disk.is_well and not self.is_touched and found not in allowed | self.possible:
+            self.complain(f"{found} is read, {allowed | self.possible} may be there")
 
     def lose_power(self) -> None:
         self.possible = set(self.durable)
@@ -90,6 +101,7 @@ class SettingsPlayer(ValuePlayer):
     """What is set on a simulated rig: for the time of one gateway, which ends with the power."""
 
     folders: ClassVar = ("simulation.json",)
+    has_one_writer: ClassVar = True
 
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
