@@ -8,9 +8,11 @@ from gateway.processes.event import EventRecord, make_event, parse_event
 from gateway.processes.event_file import KEPT, NAME, EventFile, EventReader
 from gateway.processes.event_log import _EventFileWriter
 from gateway.service.clean_shutdown_marker import CleanShutdownMarker
+from tests.disk.drawn.drawn_disk import Killed
 from tests.disk.drawn.players.player import Player
 
 SECRET = "s3cr3t"
+SOURCES = "control", "guardian"
 
 
 class NotedFile(EventFile):
@@ -74,6 +76,7 @@ class EventsPlayer(Player):
         self.number = 0
         self.kept: list[str] = []
         self.writers: list[EventWriter] = []
+        self.is_saying = False
         self._follow()
 
     def _follow(self) -> None:
@@ -81,16 +84,29 @@ class EventsPlayer(Player):
         self.is_following = self.is_looking = False
 
     def begin(self) -> None:
-        self.writers = [EventWriter(self, source) for source in ("control", "guardian")]
+        self.writers = [EventWriter(self, source) for source in SOURCES]
 
     def act(self) -> None:
-        writer = self.rng.choice(self.writers)
+        self._say(self.writers[0])
+
+    def _say(self, writer: EventWriter) -> None:
         for _ in range(self.rng.choice([1, 1, 2, 4])):
             self.number += 1
             writer.say(self.number)
 
     def verb(self) -> None:
-        """`events`, and `events --follow`."""
+        """`events`, and `events --follow`; or the guardian says something."""
+        if self.rng.random() < 0.4 and not self.is_saying:  # beside itself
+            self.is_saying = True
+            try:
+                self._say(self.writers[1])
+            except Killed:  # another one is started
+                self.writers[1].file.close()
+                self.writers[1] = EventWriter(self, SOURCES[1])
+                raise
+            finally:
+                self.is_saying = False
+            return
         try:
             with EventReader(self.state) as reader:
                 list(reader.read_stored())
@@ -143,14 +159,16 @@ class EventsPlayer(Player):
             return texts
         self._judge_order(texts, "there are")
         gone = [text for text in self.kept if text not in set(texts)]
-        if gone != self.kept[: len(gone)]:
-            self.complain(f"{gone[-1]} is gone, and older ones are there")
+        for source in SOURCES:  # what two say at once is in no order
+            kept, lost = ([text for text in one if text.endswith(source)] for one in (self.kept, gone))
+            if lost != kept[: len(lost)]:
+                self.complain(f"{lost[-1]} is gone, and older ones are there")
         if gone and len(list(self.state.glob(f"{NAME}.*"))) < KEPT - 1:
             self.complain(f"{len(gone)} events went, and there was room for them")
         return texts
 
     def _judge_order(self, texts: list[str], what: str) -> None:
-        for source in ("control", "guardian"):
+        for source in SOURCES:
             numbers = [int(text.split()[1]) for text in texts if text.startswith("event ") and text.endswith(source)]
             if numbers != sorted(set(numbers)) and not self.is_touched:
                 self.complain(f"{what} events of {source} twice, or out of order: {numbers[-9:]}")
