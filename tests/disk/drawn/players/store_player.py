@@ -154,7 +154,7 @@ class StorePlayer(Player):
             for entry in entries:
                 if entry.fault:
                     self.judge_words(entry.fault)
-                elif (mark := self.documents.get(entry.number)) and not self._is_same(entry, mark):
+                elif not self._is_whole(entry):
                     self.complain(f"{entry.number} was altered, and is taken for whole")
             return
         self._judge_selected(selected)
@@ -166,9 +166,10 @@ class StorePlayer(Player):
         if lost := set(self.documents) - there:
             self.complain(f"{sorted(lost)} were stored, and are gone")
 
-    def _is_same(self, entry: Any, mark: str) -> bool:
-        encode, number = self.store().encode, entry.number
-        return encode(entry.document, number) == encode(self.document(int(mark)), number)
+    def _is_whole(self, entry: Any) -> bool:
+        """All of it has the mark that it carries."""
+        encode, number, mark = self.store().encode, entry.number, self.mark_of(entry.document)
+        return mark.isdecimal() and encode(entry.document, number) == encode(self.document(int(mark)), number)
 
     def _judge_selected(self, selected: Any) -> None:
         if selected.notes:
