@@ -73,7 +73,7 @@ class EventsPlayer(Player):
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
         self.longest_bytes = self.rng.choice([700, 2500, 1 << 20])
-        self.number = 0
+        self.number = self.cut_number = 0
         self.kept: list[str] = []
         self.writers: list[EventWriter] = []
         self.is_saying = False
@@ -137,7 +137,9 @@ class EventsPlayer(Player):
         self.follower.close()
 
     def lose_power(self) -> None:
+        """None is synced: of what was said before, and of its files' names, anything may be there."""
         self.kept.clear()
+        self.cut_number = self.number
         self.follower.close()
         self._follow()
 
@@ -169,7 +171,8 @@ class EventsPlayer(Player):
 
     def _judge_order(self, texts: list[str], what: str) -> None:
         for source in SOURCES:
-            numbers = [int(text.split()[1]) for text in texts if text.startswith("event ") and text.endswith(source)]
+            told = [int(text.split()[1]) for text in texts if text.startswith("event ") and text.endswith(source)]
+            numbers = [number for number in told if number > self.cut_number]
             if numbers != sorted(set(numbers)) and not self.is_touched:
                 self.complain(f"{what} events of {source} twice, or out of order: {numbers[-9:]}")
 

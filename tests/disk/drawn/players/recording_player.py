@@ -123,7 +123,7 @@ class RecordingPlayer(Player):
     def verb(self) -> None:
         """A person at a terminal, or the page."""
         verb: Callable[[], None] = self.rng.choice(
-            [self._list, self._list, self._keep, self._let_go, self._delete, self._prune]
+            [self._list, self._keep, self._keep, self._let_go, self._delete, self._prune]
         )
         try:
             verb()

@@ -97,14 +97,14 @@ class UploadPlayer(Player):
             self.rng.choice([*self.marks, len(self.marks), len(self.marks)]),
             self.rng.choice(SLOTS),
         )
-        is_torn = self.rng.random() < 0.2
         block = staged(set_of(mark), slot=slot)
-        requests = list(requests_of(block, self.rng.choice([20, 100])))
-        for address, part in requests:
+        for address, part in requests_of(block, self.rng.choice([20, 100])):
             bench.bank.write_registers(address, part, PEER)
-        if is_torn:
-            at = self.rng.randrange(1, 8)
-            bench.write(1000 + at, self.rng.choice([0x4100, 0x7FC0, 1]))
+        is_torn = False
+        if self.rng.random() < 0.2:
+            at, word = self.rng.randrange(1, 8), self.rng.choice([0x4100, 0x7FC0, 1])
+            bench.write(1000 + at, word)
+            is_torn = block[2 * at : 2 * at + 2] != word.to_bytes(2)
         action = self.rng.choice([CommitAction.COMMIT] * 4 + [CommitAction.DRY_RUN])
         bench.write(COMMIT, int(action))
         self.marks |= {mark}
