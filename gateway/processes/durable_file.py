@@ -129,6 +129,19 @@ def replace_text(target: Path, text: str) -> None:
         stream.write(text.encode())
 
 
+def create_text(target: Path, text: str) -> None:
+    """Write a new file of people's durably. FileExistsError where there is one; OSError, and there is none, where the disk
+    refuses."""
+    with closing_descriptor(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)) as descriptor:
+        try:
+            write_whole(descriptor, text.encode())
+            os.fsync(descriptor)
+        except OSError as error:  # of the descriptor it knows no name
+            target.unlink()
+            raise OSError(error.errno, error.strerror, str(target)) from None
+    sync_path(target.parent)
+
+
 @contextlib.contextmanager
 def replacing_file(target: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
     """Yield a stream for a file of people's: behind the block, durably, it stands in place of the one that may be there.
