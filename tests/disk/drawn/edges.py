@@ -10,7 +10,8 @@ import pytest
 from gateway.processes import durable_file
 from gateway.recording import recorder
 from gateway.recording.care import keeping
-from tests.disk.drawn.players.recording_player import RecordingPlayer, row_of
+from tests.disk.drawn.players.recording_laws import row_of
+from tests.disk.drawn.players.recording_player import RecordingPlayer
 from tests.disk.drawn.workers import DrawnWorker
 
 if TYPE_CHECKING:

@@ -2,12 +2,21 @@
 there are too many."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import RecordingEntry, read_recording
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+
+_REST = (0.0,) * (len(COLUMNS) - COLUMNS.index("force_n") - 1)
 
 Sizes = dict[str, tuple[int, float]]
 """Bytes and time of the end (s of the epoch), by the file's name."""
+
+
+def row_of(time_s: float, sample: Any, *_: Any) -> tuple[float, ...]:
+    """A row that is known by its number."""
+    return (time_s, 1.0, float(sample.number), *_REST)
 
 
 def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str:
