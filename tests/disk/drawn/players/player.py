@@ -58,6 +58,11 @@ class Player(ABC):
         """A law did not hold."""
         self.scene.complain(f"{type(self).__name__}: {words}")
 
+    def complain_if(self, words: str) -> None:
+        """The same, where there is something to say."""
+        if words:
+            self.complain(words)
+
     def judge_words(self, sentence: str) -> None:
         """A refusal is a sentence that names what and where."""
         self.scene.judge_words(sentence)

@@ -29,6 +29,13 @@ def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str
     return ""
 
 
+def out_of_turn(before: Sizes, pruned: set[str], protected: set[str]) -> str:
+    """Return what was left and is older than what has gone, in words; empty for nothing, and where a clock was set back."""
+    times = [before[name][1] for name in sorted(before)]
+    older = {name for name in set(before) - pruned - protected if name < max(pruned, default="")}
+    return f"{older} stayed, and newer ones went: {pruned}" if older and times == sorted(times) else ""
+
+
 def broken_rows(entries: list[RecordingEntry], told: dict[str, int], durable: set[str], last: int) -> Iterator[str]:
     """Say where what was told is not there, or something is there twice, out of order, or was never recorded.
 
