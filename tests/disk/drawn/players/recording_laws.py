@@ -1,7 +1,9 @@
 """What recordings must hold after what was told of them; and what a retention may take: what is too old, and as many bytes as
 there are too many."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from gateway.profiles.recordings_section import Retention
@@ -17,6 +19,11 @@ Sizes = dict[str, tuple[int, float]]
 def row_of(time_s: float, sample: Any, *_: Any) -> tuple[float, ...]:
     """A row that is known by its number."""
     return (time_s, 1.0, float(sample.number), *_REST)
+
+
+def marked(folder: Path) -> set[str]:
+    """Names of the recordings that have the mark of who keeps them."""
+    return {f"{name.removesuffix('.keep')}.fgr" for name in os.listdir(folder) if name.endswith(".keep")}  # noqa: PTH208
 
 
 def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str:

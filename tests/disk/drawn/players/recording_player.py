@@ -16,7 +16,7 @@ from gateway.recording.label import RecordingLabel
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.watch.reference_recording import read_reference_recording
 from tests.disk.drawn.players.player import Player
-from tests.disk.drawn.players.recording_laws import broken_rows, out_of_turn, spared
+from tests.disk.drawn.players.recording_laws import broken_rows, marked, out_of_turn, spared
 from tests.service.rigs import demo
 
 LABELS = ("", "vor der Reparatur", "a/b", "ä 'x' \"y\"")
@@ -210,10 +210,11 @@ class RecordingPlayer(Player):
         refused = len(self.disk.refused)
         try:
             pruned = prune(state, retention, *rest)
-            names = {one.path.name for one in pruned}
-            self.gone |= names & set(self.durable)
+            self.gone |= (names := {one.path.name for one in pruned}) & set(self.durable)
             if len(self.disk.refused) == refused and not self.is_touched:
-                self.complain_if(out_of_turn(before, names, must_stay | self.scene.kept | open_before | self.deleted))
+                with self.disk.aside():
+                    stay = {*rest[:1]} | marked(self.path("recordings")) | open_before | self.deleted
+                self.complain_if(out_of_turn(before, names, stay))
             return pruned
         finally:
             after = self._sizes()
