@@ -6,13 +6,13 @@ archive changes nothing; what was there before is kept under another name, not d
 """
 
 import contextlib
+import errno
 import gzip
 import io
 import json
 import os
 import shutil
 import tarfile
-import tempfile
 import zlib
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -21,9 +21,9 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.audit.audit_file import HEAD
-from gateway.plain_file import check_plain, open_plain_stream, replaced_by
+from gateway.plain_file import check_plain, open_plain_stream
 from gateway.processes import state_lock
-from gateway.processes.durable_file import sync_path
+from gateway.processes.durable_file import lock_directory, make_path, replacing_file, sync_path
 from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING
 
 _MANIFEST: Final = "backup.json"
@@ -46,25 +46,16 @@ _DAMAGE: Final = (tarfile.TarError, gzip.BadGzipFile, zlib.error, EOFError, Valu
 def pack_state(state: Path, target: Path) -> list[str]:
     """Write everything of `state` to `target`; the names packed. OSError when either cannot be used."""
     files: list[Path] = []
-    target = replaced_by(target)
-    with tempfile.NamedTemporaryFile(dir=target.parent, prefix=f".{target.name}.", delete=False) as stream:
-        beside = Path(stream.name)
-        try:
-            with (
-                gzip.GzipFile(fileobj=stream, mode="wb", mtime=0) as packed,  # of a clock beyond 2106 it has no room
-                tarfile.open(fileobj=packed, mode="w", dereference=True) as archive,  # a second name is a file, too
-            ):
-                _add_manifest(archive, state)
-                for path in (path for path in _files(state) if _is_kept(path, state)):
-                    with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
-                        _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
-                        files.append(path)
-            stream.flush()
-            os.fsync(stream.fileno())
-            beside.replace(target)
-            sync_path(target.parent)
-        finally:
-            beside.unlink(missing_ok=True)
+    with (
+        replacing_file(target, _OWNER_READS) as stream,
+        gzip.GzipFile("", "wb", fileobj=stream, mtime=0) as packed,  # of a clock beyond 2106 it has no room
+        tarfile.open(fileobj=packed, mode="w", dereference=True) as archive,  # a second name is a file, too
+    ):
+        _add_manifest(archive, state)
+        for path in (path for path in _files(state) if _is_kept(path, state)):
+            with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
+                _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
+                files.append(path)
     return [str(path.relative_to(state)) for path in files if not path.is_dir()]
 
 
@@ -89,9 +80,8 @@ def unpack_state(source: Path, state: Path) -> Path | None:
     none."""
     names_in(source)
     state = state.resolve()  # by a link it is on another disk, and stays there
-    state.parent.mkdir(parents=True, exist_ok=True)
-    beside = Path(tempfile.mkdtemp(dir=state.parent, prefix=f".{state.name}."))
-    try:
+    make_path(state.parent, 0o777)
+    with _beside(state) as beside:
         with _damage_told(source), tarfile.open(source, "r:gz") as archive:
             _extract(archive, beside)
         fresh = beside / _TOP
@@ -100,8 +90,23 @@ def unpack_state(source: Path, state: Path) -> Path | None:
         _give_to_owner(fresh, state if state.exists() else state.parent)
         _sync_all(fresh)
         return _put_in_place(fresh, state)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _beside(state: Path) -> Iterator[Path]:
+    """Yield an empty directory beside the state, gone behind the block. It has one name, so that what a killed restore has
+    left, a whole state, goes with the next one; while another restore is at work on it, OSError."""
+    beside = state.with_name(f".{state.name}.restored")
+    with contextlib.suppress(FileNotFoundError), lock_directory(beside):
+        shutil.rmtree(beside)
+    beside.mkdir(mode=0o700)
+    with lock_directory(beside) as descriptor:
+        if not os.path.samestat(os.fstat(descriptor), beside.stat()):
+            raise OSError(errno.EBUSY, "another restore is at work there", str(state))
+        try:
+            yield beside
+        finally:
+            shutil.rmtree(beside, ignore_errors=True)
 
 
 def _extract(archive: tarfile.TarFile, folder: Path) -> None:
@@ -239,11 +244,8 @@ def _is_left_out(parent: str, name: str) -> bool:
 
 
 def _set_aside(state: Path) -> Path | None:
-    """Rename what is there; an empty directory is simply removed."""
-    if not state.exists():
-        return None
-    if not any(state.iterdir()):
-        state.rmdir()
+    """Rename what is there; an empty directory stays, for another one may take its name."""
+    if not state.exists() or not any(state.iterdir()):
         return None
     number = 1
     while (previous := state.with_name(f"{state.name}.before-restore-{number}")).exists():

@@ -24,7 +24,8 @@ from typing import Any, Final
 from gateway import VERSION
 from gateway.cli.errors import CliError
 from gateway.defaults import HOST
-from gateway.plain_file import replaced_by, tell_place_and_refusal
+from gateway.plain_file import tell_place_and_refusal
+from gateway.processes.durable_file import replacing_file
 
 EVENT_LINES: Final = 2000
 _NOT_IN_IT: Final = "not in it: "
@@ -113,18 +114,16 @@ def parts_missing(parts: dict[str, str]) -> list[str]:
 def pack_bundle(parts: dict[str, str], target: Path) -> None:
     """Write the parts as a tar.gz; OSError when the disk does not take it. Nothing half stays behind.
     Without a time of its own, for which gzip has room until 2106, and a clock may be ahead of that."""
-    target = replaced_by(target)
-    beside = target.with_name(f".{target.name}.part")
-    try:
-        with gzip.GzipFile(beside, "wb", mtime=0) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
-            for name, text in parts.items():
-                data = text.encode()
-                member = tarfile.TarInfo(f"force-gateway-report/{name}")
-                member.size = len(data)
-                archive.addfile(member, io.BytesIO(data))
-        beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)
+    with (
+        replacing_file(target) as stream,
+        gzip.GzipFile("", "wb", fileobj=stream, mtime=0) as packed,
+        tarfile.open(fileobj=packed, mode="w") as archive,
+    ):
+        for name, text in parts.items():
+            data = text.encode()
+            member = tarfile.TarInfo(f"force-gateway-report/{name}")
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
 
 
 def _without_told_secrets(text: str) -> str:

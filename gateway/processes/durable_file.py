@@ -16,13 +16,15 @@ import os
 import stat
 import time
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, BinaryIO, Final
 from zlib import crc32
 
 from gateway.plain_file import closing_descriptor, open_plain, open_plain_stream, replaced_by, write_whole
 
 _FRESH: Final = ".new"
+_BESIDE: Final = ".part"
 _READER_BOUND_S: Final = 2.0
 _WRITER_BOUND_S: Final = 10.0  # the fsyncs of another one on a slow disk
 _LOCK_POLL_S: Final = 0.01
@@ -64,7 +66,7 @@ def _lock(descriptor: int, directory: Path, *, shared: bool) -> None:
 def make_directory(directory: Path) -> None:
     """Make the directory, durably. OSError, and it is not there unless it was before, when that fails. The name of one that is
     there may not be on the disk yet: who made it was killed, or is at it now."""
-    directory.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    make_path(directory.parent)
     try:
         directory.mkdir(mode=0o700)
     except FileExistsError:
@@ -77,6 +79,15 @@ def make_directory(directory: Path) -> None:
         with contextlib.suppress(OSError):
             directory.rmdir()
         raise
+
+
+def make_path(directory: Path, mode: int = 0o700) -> None:
+    """Make the directory and those above it, and have the names of those that were made on the disk: what is stored durably in
+    one whose own name is lost is lost with it. OSError where that is refused; some may be there then."""
+    made = [each for each in (directory, *directory.parents) if not each.exists()]
+    directory.mkdir(parents=True, exist_ok=True, mode=mode)
+    for each in made:
+        sync_path(each.parent)
 
 
 def _make_owner_s(directory: Path) -> None:
@@ -100,11 +111,11 @@ def write_durably(directory: int, name: str, data: bytes) -> None:
         raise
 
 
-def replace_durably(directory: int, name: str, data: bytes) -> None:
+def replace_durably(directory: int, name: str, data: bytes, mode: int = 0o640) -> None:
     """Write a file durably in place of the one that may be there. OSError when that fails: it holds the old data then, or,
     where only the directory's fsync was refused, the new ones."""
     try:
-        _write(directory, name + _FRESH, data)
+        _write(directory, name + _FRESH, data, mode)
         os.rename(name + _FRESH, name, src_dir_fd=directory, dst_dir_fd=directory)
         os.fsync(directory)
     except OSError:
@@ -114,16 +125,68 @@ def replace_durably(directory: int, name: str, data: bytes) -> None:
 
 def replace_text(target: Path, text: str) -> None:
     """Write a file of people's durably in place of the one that may be there. OSError, and what was there stays."""
+    with replacing_file(target) as stream:
+        stream.write(text.encode())
+
+
+def create_text(target: Path, text: str) -> None:
+    """Write a new file of people's durably. FileExistsError where there is one; OSError, and there is none, where the disk
+    refuses."""
+    with closing_descriptor(os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)) as descriptor:
+        try:
+            write_whole(descriptor, text.encode())
+            os.fsync(descriptor)
+        except OSError as error:  # of the descriptor it knows no name
+            target.unlink()
+            raise OSError(error.errno, error.strerror, str(target)) from None
+    sync_path(target.parent)
+
+
+@contextlib.contextmanager
+def replacing_file(target: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
+    """Yield a stream for a file of people's: behind the block, durably, it stands in place of the one that may be there.
+    OSError, and what was there stays; only where the folder's fsync alone is refused is the new one there. mode: as of open."""
     target = replaced_by(target)
-    beside = target.with_name(f".{target.name}.{os.getpid()}")
+    beside, descriptor = open_beside(target, mode)
+    with open(beside, "wb", opener=lambda name, flags: descriptor) as stream:
+        try:
+            yield stream
+            stream.flush()
+            os.fsync(stream.fileno())
+            beside.replace(target)
+        except BaseException:
+            beside.unlink(missing_ok=True)  # still locked: it is nobody else's
+            raise
+    sync_path(target.parent)
+
+
+def open_beside(target: Path, mode: int) -> tuple[Path, int]:
+    """Return path and descriptor of an empty file beside a target that nobody else writes: the first whose lock is free. One
+    that a killed process has left is used again. OSError where there is none."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
+    for number in count():
+        beside = target.with_name(f".{target.name}.{number}{_BESIDE}")
+        descriptor = open_plain(beside, flags, mode)
+        try:
+            if _is_ours(descriptor, beside):
+                os.ftruncate(descriptor, 0)
+                return beside, descriptor
+        except BaseException:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
+    raise AssertionError("numbers have no end")
+
+
+def _is_ours(descriptor: int, path: Path) -> bool:
+    """Lock it. False where somebody else has it, or had it and has given it its name, or removed it, a moment ago."""
     try:
-        beside.write_text(text, encoding="utf-8")
-        sync_path(beside)
-        beside.replace(target)
-        sync_path(target.parent)
-    finally:
-        with contextlib.suppress(OSError):
-            beside.unlink(missing_ok=True)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except (BlockingIOError, FileNotFoundError):
+        return False
+    except OSError:  # some file systems have no locks
+        return True
 
 
 def read_regular(path: Path) -> bytes:
@@ -203,10 +266,10 @@ def verify_checksum(data: bytes) -> bytes:
     raise ValueError(f"is damaged: its {len(rest)} bytes have crc32 {crc32(rest):08x}, its first line says otherwise")
 
 
-def _write(directory: int, name: str, data: bytes) -> None:
+def _write(directory: int, name: str, data: bytes, mode: int) -> None:
     """A whole new file on the disk, under a name that nobody reads; what a killed writer left there goes."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
-    with closing_descriptor(open_plain(name, flags, 0o640, directory=directory)) as descriptor:
+    with closing_descriptor(open_plain(name, flags, mode, directory=directory)) as descriptor:
         write_whole(descriptor, data)
         give_to_owner(descriptor, name, directory)
         os.fsync(descriptor)

@@ -144,12 +144,14 @@ def _open_files(path: Path) -> list[IO[bytes]]:
     """Return the files that there are, oldest first. Opened newest first: one that gets its next number meanwhile is met again,
     and known by its inode."""
     opened: dict[tuple[int, int], IO[bytes]] = {}
-    for number in range(KEPT + 1):
-        with contextlib.suppress(FileNotFoundError):
-            stream = open_plain_stream(_rotated_path(path, number))
-            status = os.fstat(stream.fileno())
-            if opened.setdefault((status.st_dev, status.st_ino), stream) is not stream:
-                stream.close()
+    with contextlib.ExitStack() as stack:  # where one is refused the others are closed
+        for number in range(KEPT + 1):
+            with contextlib.suppress(FileNotFoundError):
+                stream = stack.enter_context(open_plain_stream(_rotated_path(path, number)))
+                status = os.fstat(stream.fileno())
+                if opened.setdefault((status.st_dev, status.st_ino), stream) is not stream:
+                    stream.close()
+        stack.pop_all()
     return list(reversed(opened.values()))
 
 

@@ -1,18 +1,17 @@
-"""Recordings as CSV and Parquet, for every other tool. Whole files or none: written beside the target, then renamed.
+"""Recordings as CSV and Parquet, for every other tool. Whole files or none, on the disk when they
+have their name.
 
 CSV follows the recording contract of the diagnosis: UTF-8, `# key: value` lines, one header row, one row per sample;
 values that are not there read `nan`. What is no plain word or number in the header stands as JSON on its one line.
 """
 
 import json
-import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
 
 from gateway.extras import import_library, is_installed
-from gateway.plain_file import replaced_by
+from gateway.processes.durable_file import replacing_file
 from gateway.recording.reader import Recording
 
 
@@ -24,7 +23,8 @@ def export_name(recording: Recording, number: int, form: str) -> str:
 
 def export_csv(recording: Recording, target: Path) -> None:
     """Write `recording` as CSV; OSError when target cannot be written."""
-    _replace(target, lambda stream: write_csv(recording, stream))
+    with replacing_file(target) as stream:
+        write_csv(recording, stream)
 
 
 def write_csv(recording: Recording, stream: IO[bytes]) -> None:
@@ -55,7 +55,8 @@ def export_parquet(recording: Recording, target: Path) -> None:
     import_library("pyarrow")
     from pyarrow import parquet
 
-    _replace(target, lambda stream: parquet.write_table(_table(recording), stream, compression="zstd"))
+    with replacing_file(target) as stream:
+        parquet.write_table(_table(recording), stream, compression="zstd")
 
 
 def _table(recording: Recording) -> Any:
@@ -76,14 +77,3 @@ def _one_line(value: Any) -> str:
     if isinstance(value, str) and "\n" not in value and "\r" not in value:
         return value
     return json.dumps(value)
-
-
-def _replace(target: Path, write: Callable[[IO[bytes]], None]) -> None:
-    target = replaced_by(target)
-    beside = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        with beside.open("wb") as stream:
-            write(stream)
-        beside.replace(target)
-    finally:
-        beside.unlink(missing_ok=True)

@@ -6,10 +6,12 @@ A disk that does not take it is no reason not to control: then the next start do
 
 import contextlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
-from gateway.processes.durable_file import read_object
+from gateway.plain_file import closing_descriptor
+from gateway.processes.durable_file import read_object, replace_durably, sync_path
 from gateway.processes.state_directory import LEFT, RUNNING
 
 
@@ -20,13 +22,16 @@ class CleanShutdownMarker:
         self._path, self._left = state / RUNNING, state / LEFT
 
     def mark_running(self) -> bool:
-        """Mark this run as begun; True when the one before never lowered its flag, or when that cannot be known."""
+        """Mark this run as begun, on the disk: the power may go at once. True when the one before never lowered its flag, or
+        when that cannot be known."""
         try:
             was_unclean = self._path.exists()
         except OSError:
             was_unclean = True
         with contextlib.suppress(OSError):
-            self._path.touch(mode=0o600)
+            if not was_unclean:
+                self._path.touch(mode=0o600)
+                sync_path(self._path.parent)
         return was_unclean
 
     @property
@@ -39,10 +44,16 @@ class CleanShutdownMarker:
 
     def clear(self, left: dict[str, Any] | None = None) -> None:
         """Remove the file: this run ended cleanly. left: for the next start; where that is not stored the file stays, for the
-        next start would believe that nobody had hung."""
-        with contextlib.suppress(OSError):
-            self._left.unlink(missing_ok=True)
+        next start would believe that nobody had hung. So it is on the disk before the file goes: a machine is often
+        switched off right behind its gateway."""
+        with (
+            contextlib.suppress(OSError),
+            closing_descriptor(os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)) as directory,
+        ):
             if left:
-                self._left.touch(mode=0o600)
-                self._left.write_text(json.dumps(left), encoding="utf-8")
+                replace_durably(directory, LEFT, json.dumps(left).encode(), mode=0o600)
+            elif self._left.exists():
+                self._left.unlink(missing_ok=True)
+                os.fsync(directory)
             self._path.unlink(missing_ok=True)
+            os.fsync(directory)

@@ -19,6 +19,7 @@ from typing import Any, Final
 
 from gateway.ports import PortError
 from gateway.processes import exit_codes
+from gateway.processes.durable_file import make_path
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import Ending
@@ -58,7 +59,7 @@ def main(arguments: list[str]) -> int:
     with contextlib.suppress(
         OSError
     ):  # what cleans up a disk takes it from a gateway that runs: then it is there again
-        Path(options["state"]).mkdir(parents=True, exist_ok=True, mode=0o700)
+        make_path(Path(options["state"]))
     with EventLog(source="control", file=EventFile(Path(options["state"]))) as log:
         try:
             rig = kept_rig(options["rig"], simulated=options["simulate"], memory=options["kept_rig"])

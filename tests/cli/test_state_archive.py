@@ -1,7 +1,9 @@
 """An archive by itself: on the disk before it has its name, its content before it is the state, and checked both ways."""
 
+import errno
 import io
 import os
+import stat
 import tarfile
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 
 from gateway.cli import state_archive
 from gateway.cli.state_archive import ArchiveError, names_in, pack_state, unpack_state
+from gateway.processes.durable_file import lock_directory
 
 
 def archive_of(path: Path, manifest: bytes, *names: str) -> Path:
@@ -31,10 +34,35 @@ def test_a_backup_is_on_the_disk_before_it_has_its_name(
     state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target, synced = tmp_path / "b.tar.gz", list[tuple[str, bool]]()
-    monkeypatch.setattr(state_archive.os, "fsync", lambda descriptor: synced.append(("file", target.exists())))
-    monkeypatch.setattr(state_archive, "sync_path", lambda path: synced.append((path.name, target.exists())))
+
+    def note(descriptor: int) -> None:
+        synced.append(("folder" if stat.S_ISDIR(os.fstat(descriptor).st_mode) else "file", target.exists()))
+
+    monkeypatch.setattr(os, "fsync", note)
     pack_state(state, target)
-    assert synced == [("file", False), (tmp_path.name, True)]
+    assert synced == [("file", False), ("folder", True)]
+
+
+def test_what_a_killed_restore_has_left_goes_with_the_next_one(state: Path, tmp_path: Path) -> None:
+    """A whole state stayed behind each, and nobody's list showed it."""
+    pack_state(state, tmp_path / "b.tar.gz")
+    left = tmp_path / f".{state.name}.restored" / "state" / "recordings"
+    left.mkdir(parents=True)
+    (left / "0009.fgr").write_bytes(b"half of it")
+    before = unpack_state(tmp_path / "b.tar.gz", state)
+    assert before is not None
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(["b.tar.gz", state.name, before.name])
+    assert not (state / "recordings").exists()
+
+
+def test_two_restores_at_once_mix_nothing(state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pack_state(state, tmp_path / "b.tar.gz")
+    monkeypatch.setattr("gateway.processes.durable_file._WRITER_BOUND_S", 0.0)
+    at_work = tmp_path / f".{state.name}.restored"
+    at_work.mkdir()
+    with lock_directory(at_work), pytest.raises(OSError, match="locked"):
+        unpack_state(tmp_path / "b.tar.gz", state)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([at_work.name, "b.tar.gz", state.name])
 
 
 def test_what_is_restored_is_on_the_disk_before_it_is_the_state(
@@ -98,6 +126,24 @@ def test_only_the_gateway_s_own_files_are_left_out(state: Path, tmp_path: Path) 
         (folder / "lock").touch()
         (folder / "running").touch()
     assert pack_state(state, tmp_path / "b.tar.gz")[1:] == ["calibrations/lock", "calibrations/running"]
+
+
+def test_a_restore_that_is_refused_leaves_an_empty_directory_where_it_was(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pack_state(state, tmp_path / "b.tar.gz")
+    (empty := tmp_path / "empty").mkdir()
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as failing:
+        failing.setattr(os, "rename", refuse)
+        with pytest.raises(OSError, match="Input/output"):
+            unpack_state(tmp_path / "b.tar.gz", empty)
+    assert empty.is_dir()
+    assert unpack_state(tmp_path / "b.tar.gz", empty) is None
+    assert (empty / "calibrations" / "0001.yaml").read_text() == "name: one\n"
 
 
 def test_an_empty_state_comes_back_empty(tmp_path: Path) -> None:

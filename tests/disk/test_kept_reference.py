@@ -1,9 +1,11 @@
-"""The rig's reference recording is the one that was chosen, whatever the disk did meanwhile."""
+"""The rig's reference recording is the one that was chosen, and what is kept is kept, whatever the disk did meanwhile."""
 
 import contextlib
 from hashlib import sha256
 from pathlib import Path
 
+from gateway.recording import Recorder
+from gateway.recording.care.keeping import is_kept, keep_recording
 from gateway.watch.reference_recording import (
     drop_reference_recording,
     keep_reference_recording,
@@ -41,3 +43,14 @@ def test_a_reference_that_was_dropped_is_gone_after_a_power_cut(fast_folder: Pat
     for mode, tree in disk.states(len(disk.changes), 0):
         tree.write_to(fast_folder / mode)
         assert read_reference_recording(fast_folder / mode) is None, mode
+
+
+def test_a_recording_that_is_said_to_be_kept_is_kept_after_a_power_cut(fast_folder: Path) -> None:
+    recorder = Recorder(fast_folder / "recordings", {"rig": "demo"}, ("time_s",))
+    recorder.close()
+    disk = JournaledDisk(fast_folder / "recordings")
+    with watching(disk):
+        keep_recording(recorder.path)
+    for mode, tree in disk.states(len(disk.changes), 0):
+        tree.write_to(fast_folder / mode)
+        assert is_kept(fast_folder / mode / recorder.path.name), mode

@@ -16,7 +16,8 @@ from tests.disk.watched_disk import watching
 
 CUTS = 2
 SEEDS = 5
-"""In the push gate so many cuts of each act; with --long all of them, each with so many mixtures of what was not synced."""
+"""In the push gate so many cuts of each act, and the one behind all of it; with --long all of them, each with so many mixtures
+of what was not synced."""
 
 
 def journal(act: Act) -> JournaledDisk:
@@ -37,7 +38,7 @@ def test_after_a_power_cut_it_is_the_old_or_the_new_and_what_was_said_stays(
     state.mkdir()
     disk = journal(kind_of_act(state))
     every = range(len(disk.changes) + 1)
-    cuts = every if budget > 1 else sorted(Random(1).sample(every, min(CUTS, len(every))))
+    cuts = every if budget > 1 else sorted({every[-1], *Random(1).sample(every, min(CUTS, len(every)))})
     count = 0
     for seed in range(SEEDS if budget > 1 else 1):
         for cut in cuts:
@@ -68,6 +69,17 @@ def test_what_is_stored_in_a_folder_whose_maker_was_killed_outlives_a_power_cut(
     for mode, tree in disk.states(len(disk.changes), 0):
         tree.write_to(fast_folder / mode)
         assert CalibrationStore(fast_folder / mode).numbers() == [number]
+
+
+def test_what_is_stored_in_a_state_directory_that_is_made_for_it_outlives_a_power_cut(fast_folder: Path) -> None:
+    """Of a fresh rig neither it nor the folder of all rigs is there."""
+    (home := fast_folder / "home").mkdir()
+    disk = JournaledDisk(home)
+    with watching(disk):
+        number = CalibrationStore(home / "force-gateway" / "demo").add(calibration(1))
+    for mode, tree in disk.states(len(disk.changes), 0):
+        tree.write_to(fast_folder / mode)
+        assert CalibrationStore(fast_folder / mode / "force-gateway" / "demo").numbers() == [number], mode
 
 
 class FirstAuditedWrite(AuditedWrites):

@@ -79,6 +79,8 @@ def path_of(name: Any, directory: int | None = None) -> str:
     """The absolute path of what a call names: a descriptor, or a name beneath a directory's descriptor."""
     if isinstance(name, int):
         return str(Path(f"/proc/self/fd/{name}").readlink())
+    if isinstance(name, Path) and name.is_absolute():
+        return str(name)
     base = Path.cwd() if directory is None else Path(f"/proc/self/fd/{directory}").readlink()
     return str(base / os.fspath(name))
 

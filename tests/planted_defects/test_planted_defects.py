@@ -14,6 +14,7 @@ from tests.planted_defects.defects import (
     devices,
     faces,
     force,
+    on_disk,
     page_and_telemetry,
     processes,
     registers,
@@ -36,6 +37,7 @@ ROOMS = (
     clients,
     page_and_telemetry,
     stored,
+    on_disk,
     told,
 )
 ALL = tuple(one for room in ROOMS for one in room.DEFECTS)

@@ -13,6 +13,7 @@ from gateway.processes.durable_file import (
     lock_directory,
     make_directory,
     read_object,
+    replacing_file,
     sync_path,
     write_durably,
 )
@@ -27,7 +28,11 @@ def mode_of(path: Path) -> int:
 def test_a_text_has_its_name_once_it_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     target, synced = tmp_path / "report.html", list[tuple[bool, str]]()
     target.write_text("old")
-    monkeypatch.setattr(durable_file, "sync_path", lambda path: synced.append((path.is_dir(), target.read_text())))
+
+    def note(descriptor: int) -> None:
+        synced.append((stat.S_ISDIR(os.fstat(descriptor).st_mode), target.read_text()))
+
+    monkeypatch.setattr(os, "fsync", note)
     durable_file.replace_text(target, "new")
     assert synced == [(False, "old"), (True, "new")]
     assert list(tmp_path.iterdir()) == [target]
@@ -119,10 +124,43 @@ def test_a_folder_that_may_not_outlive_a_power_cut_is_not_there(
 
 def test_a_text_that_is_not_taken_leaves_nothing_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "report.html").write_text("old")
-    monkeypatch.setattr(durable_file, "sync_path", refused)
+    monkeypatch.setattr(os, "fsync", refused)
     with pytest.raises(OSError, match="Input/output"):
         durable_file.replace_text(tmp_path / "report.html", "new")
     assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("report.html", "old")]
+
+
+def test_what_a_killed_writer_has_left_of_a_file_of_people_s_is_used_again(tmp_path: Path) -> None:
+    target = tmp_path / "kept.tar.gz"
+    for number in (0, 1):
+        (tmp_path / f".kept.tar.gz.{number}.part").write_bytes(b"gigabytes, half of them")
+    with replacing_file(target) as first, replacing_file(target) as second:
+        first.write(b"one")
+        second.write(b"another")
+    assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("kept.tar.gz", b"one")]
+
+
+def test_two_that_write_one_file_at_once_mix_nothing(tmp_path: Path) -> None:
+    """Each `report` had the same name beside it."""
+    target = tmp_path / "support.tar.gz"
+    slow = replacing_file(target)
+    stream = slow.__enter__()
+    stream.write(b"slow " * 9000)
+    with replacing_file(target) as quick:
+        quick.write(b"quick")
+    assert target.read_bytes() == b"quick"
+    stream.write(b"end")
+    slow.__exit__(None, None, None)
+    assert target.read_bytes() == b"slow " * 9000 + b"end"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_no_link_is_followed_to_a_file_of_somebody_s(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("kept")
+    (tmp_path / ".report.html.0.part").symlink_to(tmp_path / "precious")
+    with pytest.raises(OSError, match="symbolic links"):
+        durable_file.replace_text(tmp_path / "report.html", "new")
+    assert (tmp_path / "precious").read_text() == "kept"
 
 
 def test_what_a_killed_writer_has_left_is_no_part_of_the_next_file(tmp_path: Path) -> None:

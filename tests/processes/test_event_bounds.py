@@ -190,3 +190,12 @@ def test_every_old_file_is_read_oldest_first_and_one_of_two_names_once(tmp_path:
     os.link(tmp_path / f"{NAME}.1", tmp_path / f"{NAME}.2")
     with EventReader(tmp_path) as reader:
         assert [event.text for event in reader.read_stored()] == ["4", "3", "1", "0"]
+
+
+def test_files_beside_one_that_is_refused_are_closed(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(line("new"))
+    (tmp_path / f"{NAME}.1").mkdir()
+    before = sorted(Path("/proc/self/fd").iterdir())
+    with pytest.raises(OSError, match="a directory") as refused, EventReader(tmp_path) as reader:
+        list(reader.read_stored())
+    assert sorted(Path("/proc/self/fd").iterdir()) == before, refused.value

@@ -104,10 +104,10 @@ def test_on_a_full_disk_room_is_made_by_what_needs_no_room(tmp_path: Path, monke
     older, between, newest = (record(tmp_path / "recordings", 1) for _ in range(3))
     between.unlink()
 
-    def full(*arguments: object) -> None:
+    def full(*_: object, **__: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(keeping, "replace_durably", full)
+    monkeypatch.setattr(keeping, "open_plain", full)
     assert keeping.delete_recording(older, "") == "" and not older.exists()
     with pytest.raises(OSError, match="No space"):
         keeping.delete_recording(newest, "")

@@ -67,13 +67,13 @@ def test_what_a_clean_end_leaves_counts_at_the_next_start_until_the_next_clean_e
 def test_an_end_that_could_not_store_who_had_hung_is_an_unclean_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(path: Path, *_: Any, **__: Any) -> int:
+    def refuse(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "full")
 
     flag = CleanShutdownMarker(tmp_path)
     assert not flag.mark_running()
     with monkeypatch.context() as full:
-        full.setattr(Path, "write_text", refuse)
+        full.setattr("gateway.processes.durable_file.write_whole", refuse)
         flag.clear({"lost_beats": {"10.0.0.5": [7]}})
     assert flag.mark_running()
     flag.clear()

@@ -11,6 +11,7 @@ import click
 
 from gateway.cli.diagnosis.progress_line import handle_interrupt
 from gateway.cli.errors import already_exists
+from gateway.processes.durable_file import sync_path
 
 STDOUT: Final = Path("-")  # as the name of a file
 _OURS: Final = "Written by force-gateway diagnose"  # at the head of what --extend and --plan write
@@ -70,10 +71,13 @@ def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
         for path, fresh in beside.items():
             with _told_by(path):
                 fresh.write_text(texts[path], encoding="utf-8")
+                sync_path(fresh)
         if pressed:
             raise KeyboardInterrupt
         for path, fresh in beside.items():
             fresh.replace(places[path])
+        for folder in {place.parent for place in places.values()}:
+            sync_path(folder)
     finally:
         for fresh in beside.values():
             fresh.unlink(missing_ok=True)

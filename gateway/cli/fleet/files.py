@@ -9,6 +9,7 @@ from gateway.extras import import_library
 from gateway.fleet.drift import CellDrift
 from gateway.fleet.page import fleet_page
 from gateway.fleet.tasks import Row
+from gateway.processes.durable_file import replace_text, replacing_file
 
 ROWS: Final = "rows.parquet"
 DAYS: Final = "days.parquet"
@@ -24,9 +25,7 @@ def write_files(folder: Path, rows: Sequence[Row], cells: Sequence[CellDrift], v
     _write_parquet(folder / DAYS, day_rows(rows))
     _write_parquet(folder / CELLS, [cell_row(one) for one in cells])
     report = folder / REPORT
-    beside = report.with_name(f".{report.name}.new")
-    beside.write_text(fleet_page(rows, cells, verb), encoding="utf-8")
-    beside.replace(report)
+    replace_text(report, fleet_page(rows, cells, verb))
     return [folder / ROWS, folder / DAYS, folder / CELLS, report]
 
 
@@ -73,6 +72,5 @@ def _day_row(cell: str, date: str, rows: Sequence[Row]) -> dict[str, Any]:
 
 def _write_parquet(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     arrow, parquet = import_library("pyarrow"), import_library("pyarrow.parquet")
-    beside = path.with_name(f".{path.name}.new")
-    parquet.write_table(arrow.Table.from_pylist(list(rows)), beside)
-    beside.replace(path)
+    with replacing_file(path) as stream:
+        parquet.write_table(arrow.Table.from_pylist(list(rows)), stream)

@@ -16,7 +16,8 @@ from math import inf
 from pathlib import Path
 from typing import Final
 
-from gateway.processes.durable_file import lock_directory, remove_if_possible, replace_durably
+from gateway.plain_file import closing_descriptor, open_plain
+from gateway.processes.durable_file import give_to_owner, lock_directory, remove_if_possible
 from gateway.profiles.recordings_section import Retention
 from gateway.recording.layout import SUFFIX, number_in
 from gateway.recording.reader import recording_paths
@@ -32,7 +33,7 @@ def keep_recording(path: Path) -> None:
     mark = path.with_suffix(_MARK)
     try:
         with lock_directory(path.parent) as descriptor:
-            replace_durably(descriptor, mark.name, b"")
+            _set_mark(descriptor, mark.name)
     except OSError as error:  # of the descriptor it knows the name alone
         raise OSError(error.errno, error.strerror, str(mark)) from None
 
@@ -140,7 +141,7 @@ def delete_recording(path: Path, reference: str) -> str:
             return why
         is_highest = not _has_next(path) and int(path.stem) == max(_numbers(path.parent), default=0)
         if is_highest:
-            replace_durably(descriptor, path.with_suffix(_GONE).name, b"")
+            _set_mark(descriptor, path.with_suffix(_GONE).name)
         path.unlink()
         remove_if_possible(descriptor, path.with_suffix(_MARK).name)
         os.fsync(descriptor)
@@ -157,6 +158,13 @@ def drop_empty_recording(path: Path) -> None:
     path.rename(path.with_suffix(_GONE))
     with lock_directory(path.parent) as descriptor:
         _keep_highest_mark(path.parent, descriptor)
+
+
+def _set_mark(folder: int, name: str) -> None:
+    """Have an empty file of this name on the disk: it cannot be half, and so needs none beside it that a kill could leave."""
+    with closing_descriptor(open_plain(name, os.O_WRONLY | os.O_CREAT, 0o640, directory=folder)) as descriptor:
+        give_to_owner(descriptor, name, folder)
+    os.fsync(folder)
 
 
 def _has_next(path: Path) -> bool:

@@ -7,14 +7,13 @@ One that is being recorded changes all the time: who looks again and again has o
 
 import contextlib
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.processes.durable_file import read_object
+from gateway.plain_file import closing_descriptor, write_whole
+from gateway.processes.durable_file import open_beside, read_object
 from gateway.processes.state_directory import RECORDINGS
 from gateway.progress import report
 from gateway.recording.care.keeping import is_being_recorded
@@ -146,10 +145,10 @@ def _is_known(entry: Any) -> bool:
 def _write_cache(folder: Path, recordings: dict[str, list[Any]]) -> None:
     """Replace the file at once; whoever reads meanwhile has the one before. A disk that takes none costs time only."""
     with contextlib.suppress(OSError):
-        descriptor, beside = tempfile.mkstemp(dir=folder, prefix=_CACHE)
-        try:
-            with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-                json.dump({"format": _FORMAT, "recordings": recordings}, stream)
-            Path(beside).replace(folder / _CACHE)
-        finally:
-            Path(beside).unlink(missing_ok=True)
+        beside, descriptor = open_beside(folder / _CACHE, 0o600)
+        with closing_descriptor(descriptor):
+            try:
+                write_whole(descriptor, json.dumps({"format": _FORMAT, "recordings": recordings}).encode())
+                beside.replace(folder / _CACHE)
+            except OSError:
+                beside.unlink()

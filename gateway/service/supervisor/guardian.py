@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes import exit_codes, message_link
-from gateway.processes.durable_file import give_all_to_owner
+from gateway.processes.durable_file import give_all_to_owner, make_path
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
@@ -46,6 +46,10 @@ _REFUSED: Final = frozenset({exit_codes.DATA, exit_codes.PERMISSION, exit_codes.
 def run(options: RunOptions) -> int:
     """Run one rig until it is told to stop; the process's exit code."""
     state = options.state_directory
+    with contextlib.suppress(
+        OSError
+    ):  # a disk that syncs no name is no reason not to control; one that makes none is told next
+        make_path(state)
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
     with hold_state_lock(state) as is_ours:
         if not is_ours:

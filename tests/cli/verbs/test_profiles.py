@@ -17,12 +17,22 @@ from gateway.processes import exit_codes
 from gateway.profiles import ProfileError, load_rig, shipped_profiles_folder
 from gateway.registers import RegisterMap
 from tests.dialogues.cells.test_overload_dialogue import cell
+from tests.disk.failing_disks import FailingDisk
+from tests.disk.watched_disk import watching
 
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
+
+
+def test_a_disk_that_is_full_keeps_no_half_rig_file_and_the_name_is_free(here: Path, call) -> None:
+    with watching(FailingDisk(here.resolve(), "full", 2)):
+        answer = call("init", "cell-7")
+    assert answer.exit_code == 1 and "cell-7.yaml: No space left" in answer.output
+    assert list(here.iterdir()) == []
+    assert call("init", "cell-7").exit_code == 0
 
 
 def test_a_fresh_rig_is_refused_for_its_placeholders_alone_and_runs_once_they_are_edited(here: Path, call) -> None:

@@ -3,7 +3,7 @@
 from typing import Final
 
 from tests.disk.acts.acts import Act, AuditedWrites, StoredCalibrations, StoredPlants
-from tests.disk.acts.file_acts import BackedUp, CountedBirths, ReportedFit, Restored
+from tests.disk.acts.file_acts import BackedUp, Bundled, CleanEnd, CountedBirths, Exported, ReportedFit, Restored
 from tests.disk.acts.recording_acts import KeptRecordings, OneRecording, ReferenceRecordingKept, SyncedRecording
 
 BOTH: Final[tuple[type[Act], ...]] = (
@@ -14,8 +14,10 @@ BOTH: Final[tuple[type[Act], ...]] = (
     KeptRecordings,
     ReferenceRecordingKept,
     ReportedFit,
+    Exported,
+    Bundled,
     BackedUp,
     Restored,
 )
 REFUSED: Final = (*BOTH, OneRecording)
-SYNCED: Final = (*BOTH, CountedBirths)
+SYNCED: Final = (*BOTH, CountedBirths, CleanEnd)

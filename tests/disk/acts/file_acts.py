@@ -2,12 +2,19 @@
 
 import json
 import shutil
+import tarfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gateway.cli.state_archive import ArchiveError, pack_state, unpack_state
+from gateway.cli.support_bundle import pack_bundle
 from gateway.processes.durable_file import replace_text
+from gateway.recording import Recording
+from gateway.recording.export import export_csv
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.telemetry.mqtt.kept_bd_seq import KeptBdSeq
 from tests.disk.acts.acts import Act, Say
 
@@ -111,3 +118,75 @@ class Restored(Archived):
         if not self._cell.exists():  # set aside, and the disk took no other rename: the refusal has said where
             self._cell.with_name("cell.before-restore-1").rename(self._cell)
         assert self._words_in(self._cell) in (({"new"},) if said else ({"old"}, {"new"}))
+
+
+class CleanEnd(Act):
+    """A gateway that runs, and ends cleanly with what masters begin nothing by; often the machine is switched off with it."""
+
+    BEFORE, AFTER = ({"lost_beats": {"10.0.0.1": [beat]}} for beat in (1, 2))
+
+    def prepare(self) -> None:
+        self.state.mkdir(exist_ok=True)
+        CleanShutdownMarker(self.state).clear(self.BEFORE)
+
+    def run(self, say: Say) -> None:
+        marker = CleanShutdownMarker(self.state)
+        marker.mark_running()
+        say("runs")
+        marker.clear(self.AFTER)
+        say("ended")
+
+    def check(self, said: Sequence[Any]) -> None:
+        marker = CleanShutdownMarker(self.state)
+        is_unclean, left = marker.mark_running(), marker.left
+        assert said or is_unclean or left == self.BEFORE
+        assert "ended" in said or not said or is_unclean or left == self.AFTER
+        assert "ended" not in said or (left == self.AFTER and not is_unclean)
+        marker.clear(left)
+
+
+class Exported(Act):
+    """A recording is exported over an export of before."""
+
+    def prepare(self) -> None:
+        self._export(1.0)
+
+    def run(self, say: Say) -> None:
+        self._export(2.0)
+        say("exported")
+
+    def check(self, said: Sequence[Any]) -> None:
+        lines = self._target.read_text().splitlines()[-900:]
+        assert {line.split(",")[1] for line in lines} in ([{"2"}] if said else [{"1"}, {"2"}])
+        assert len(lines) == 900
+
+    def _export(self, force_n: float) -> None:
+        columns = {"time_s": np.arange(900.0), "force_n": np.full(900, force_n)}
+        export_csv(Recording(self._target, {"rig": "demo"}, columns, 900, False), self._target)
+
+    @property
+    def _target(self) -> Path:
+        return self.state / "demo-0001.csv"
+
+
+class Bundled(Act):
+    """A bundle for who helps replaces the one before."""
+
+    def prepare(self) -> None:
+        self._pack("old")
+
+    def run(self, say: Say) -> None:
+        self._pack("new")
+        say("packed")
+
+    def check(self, said: Sequence[Any]) -> None:
+        with tarfile.open(self._target) as archive:
+            texts = {stream.read() for one in archive if (stream := archive.extractfile(one))}
+        assert texts in ([{b"new" * 2000}] if said else [{b"old" * 2000}, {b"new" * 2000}])
+
+    def _pack(self, word: str) -> None:
+        pack_bundle({"events.jsonl": word * 2000, "state.txt": word * 2000}, self._target)
+
+    @property
+    def _target(self) -> Path:
+        return self.state / "support.tar.gz"

@@ -174,8 +174,8 @@ class DrawnDisk(JournaledDisk):
         super().before(call)
 
     def length_of(self, call: Call) -> int:
-        """Cut what is written short."""
-        return int(self._share * len(call.data))
+        """Cut what is written short; not what is done aside, behind a write that was."""
+        return len(call.data) if self.is_aside else int(self._share * len(call.data))
 
     def after(self, call: Call, result: Any) -> None:
         """Note it; what has no name any more is not noted."""

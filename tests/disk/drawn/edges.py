@@ -10,14 +10,20 @@ import pytest
 from gateway.processes import durable_file
 from gateway.recording import recorder
 from gateway.recording.care import keeping
-from tests.disk.drawn.recording_player import RecordingPlayer, row_of
+from tests.disk.drawn.players.recording_laws import row_of
+from tests.disk.drawn.players.recording_player import RecordingPlayer
 from tests.disk.drawn.workers import DrawnWorker
 
 if TYPE_CHECKING:
     from tests.disk.drawn.scene import Scene
 
 _ROOM: Final = "gateway.service.running_rig.recording"
-_WITH_THREADS: Final = ("gateway.audit.audit_log", f"{_ROOM}.recordings", f"{_ROOM}.retention")
+_WITH_THREADS: Final = (
+    "gateway.audit.audit_log",
+    "gateway.calibrations.upload",
+    f"{_ROOM}.recordings",
+    f"{_ROOM}.retention",
+)
 
 
 class LockClock:
@@ -60,5 +66,5 @@ def _watch_recordings(player: RecordingPlayer, patch: pytest.MonkeyPatch) -> Non
 
     patch.setattr(f"{_ROOM}.run_recording.row_of", row_of)
     patch.setattr(f"{_ROOM}.run_recording.sync_recording", watched_sync)
-    for module in (f"{_ROOM}.retention", "tests.disk.drawn.recording_player"):
+    for module in (f"{_ROOM}.retention", "tests.disk.drawn.players.recording_player"):
         patch.setattr(f"{module}.prune_recordings", watched_prune)

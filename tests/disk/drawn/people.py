@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 
 if TYPE_CHECKING:
     from tests.disk.drawn.scene import Scene
@@ -20,7 +20,7 @@ class People:
     def __init__(self, scene: "Scene") -> None:
         self.scene, self.rng = scene, scene.rng
         self._moved: list[tuple[Path, Path, str]] = []
-        self._elsewhere = scene.state.parent / "elsewhere"
+        self._elsewhere = scene.unseen / "elsewhere"
 
     def meddle(self, player: Player) -> None:
         """Do one thing to something of a player's."""

@@ -11,29 +11,34 @@ from typing import Final
 from tests.disk.drawn.drawn_disk import GATEWAY, VERB, DrawnDisk
 from tests.disk.drawn.edges import edges_of
 from tests.disk.drawn.people import People
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 from tests.disk.drawn.workers import DrawnWorker
 from tests.disk.watched_disk import watching
 
 _BEGAN_S: Final = 1.7e9
 _UNFIT: Final = ("[Errno", "Traceback", "internal error", "None", "Error(")
+_BESIDE: Final = (".new", ".0.part")  # a second one is of two that wrote at once: few, and used again then
+_HIDDEN: Final = frozenset((".summaries.json",))
 DAY_S: Final = 86400.0
 _MOST_WORK: Final = 300
 
 
 class Scene:
-    """now_s: monotonic; wall_s: of the epoch; said: what the gateway has told; broken: the laws that did not hold."""
+    """now_s: monotonic; wall_s: of the epoch; said: what the gateway has told; broken: the laws that did not hold; outside: a
+    folder of people's on the same disk; unseen: one that no scene's disk has."""
 
     def __init__(self, seed: int, folder: Path, kinds: list[type[Player]]) -> None:
         self.rng = Random(seed)
-        self.state = folder / "state"
-        self.state.mkdir()
-        self.disk = DrawnDisk(self.state)
+        self.unseen, root = folder, folder / "disk"
+        self.state, self.outside = root / "state", root / "outside"
+        self.state.mkdir(parents=True), self.outside.mkdir()
+        self.disk = DrawnDisk(root)
         self.now_s, self.wall_s = 1000.0, _BEGAN_S
         self.said: list[str] = []
         self.trace: list[str] = []
         self.broken: list[str] = []
         self.lives = 0
+        self._is_power_going = False
         self.kept: set[str] = set()  # recordings that somebody keeps
         self.reference = ""
         DrawnWorker.all.clear(), DrawnWorker.raised.clear()
@@ -99,7 +104,9 @@ class Scene:
             (3, self._heal),
             (2, self._act_beside),
             (2, self._act_and_kill),
-            (1, self._lose_power),
+            (1, self.lose_power),
+            (1, self._act_and_lose_power),
+            (2, self._lose_power_amid),
             (1, self._turn_clock),
             (1, self._meddle),
         ]
@@ -117,6 +124,9 @@ class Scene:
             work()
         self.disk.forget_plans()
         self._touch_times()
+        if self.disk.dead and self._is_power_going:
+            self._is_power_going = False
+            self.lose_power()
         self.disk.dead.discard(VERB)
         if GATEWAY in self.disk.dead:
             self.note("killed")
@@ -138,7 +148,7 @@ class Scene:
             player.tick()
 
     def _refuse(self) -> None:
-        places = ["", "", *(folder for player in self.players for folder in player.folders)]
+        places = ["", "", *(folder.rstrip("*") for player in self.players for folder in player.folders)]
         self.note(self.disk.refuse(self.rng, places))
 
     def _heal(self) -> None:
@@ -171,7 +181,21 @@ class Scene:
         self.disk.kill_in(rng.choice([0, 1, 2, 3, 5, 8, 13, 21]), rng.choice([0.0, 0.5, 1.0]))
         rng.choice([self._act, self._act, self.go_on])()
 
-    def _lose_power(self) -> None:
+    def _act_and_lose_power(self) -> None:
+        """Right behind what was said to be stored."""
+        self._act()
+        for _ in range(self.rng.choice([0, 2])):
+            self.go_on()
+        self.lose_power()
+
+    def _lose_power_amid(self) -> None:
+        """Between two calls of what is done next."""
+        self._is_power_going = True
+        self._act_and_kill()
+        self._is_power_going = False
+
+    def lose_power(self) -> None:
+        """Cut it; then a gateway starts."""
         for player in self.players:
             player.die()
         self.note(f"power cut: {self.disk.cut_power(self.rng)}")
@@ -223,16 +247,30 @@ class Scene:
                 player.judge_healed()
         if self.broken:
             return
+        self._judge_leftovers()
         self.note("another start")
         for player in self.players:
             player.die()
         self._begin_anew(is_killed=False)
         self._judge()
 
+    def _judge_leftovers(self) -> None:
+        """What is written beside a file has gone with the next that was."""
+        if any(player.is_touched for player in self.players):
+            return
+        with self.disk.aside():
+            names = [path.name for path in Path(self.disk.folder).rglob("*")]
+        if left := [
+            name
+            for name in names
+            if name.endswith(_BESIDE) or (name[0] == "." and name not in _HIDDEN and not name.endswith(".part"))
+        ]:
+            self.complain(f"{left} are left for ever")
+
     def _close(self) -> None:
         with self.disk.aside():
             for player in self.players:
-                player.die()
+                player.die(), player.close()
         DrawnWorker.all.clear()
 
     def _touch_times(self) -> None:
@@ -249,5 +287,5 @@ class Scene:
 
 def clean(folder: Path) -> None:
     """Make room for the next scene."""
-    for name in ("state", "elsewhere"):
+    for name in ("disk", "elsewhere"):
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -4,11 +4,14 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+from gateway.calibrations.activation import UnusableCalibration
+from gateway.numbered_documents.store import StoreError
+
 Work = Callable[[], Any]
 
 
 class DrawnWorker:
-    """Stands for `DiskWorker`. raised: what no disk raises, and nobody would have seen."""
+    """Stands for `DiskWorker`. raised: what no disk and no store raises, and nobody would have seen."""
 
     all: ClassVar[list["DrawnWorker"]] = []
     raised: ClassVar[list[Exception]] = []
@@ -36,7 +39,7 @@ class DrawnWorker:
             result = work()
         except Exception as error:
             result = error
-            if not isinstance(error, OSError):
+            if not isinstance(error, OSError | StoreError | UnusableCalibration):
                 self.raised.append(error)
         done(result)
 

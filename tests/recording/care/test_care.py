@@ -290,11 +290,11 @@ def test_a_recording_that_somebody_deletes_meanwhile_keeps_no_other_one(
 def test_a_mark_that_the_disk_does_not_take_is_named_by_its_whole_path(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(descriptor: int, name: str, data: bytes) -> None:
-        raise PermissionError(errno.EACCES, "Permission denied", f"{name}.new")
+    def refuse(name: str, *_: object, **__: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", name)
 
     path = record(tmp_path)
-    monkeypatch.setattr(keeping, "replace_durably", refuse)
+    monkeypatch.setattr(keeping, "open_plain", refuse)
     with pytest.raises(PermissionError) as raised:
         keep_recording(path)
     assert raised.value.filename == str(path.with_suffix(".keep")) and not keeping.is_kept(path)

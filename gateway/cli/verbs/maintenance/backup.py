@@ -31,9 +31,9 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
         )
     if file.exists() and not force:
         raise already_exists(file)
-    names = pack_state(directory, file)
+    links, names = links_in(directory), pack_state(directory, file)
     click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")
-    if links := links_in(directory):
+    if links:
         click.echo(
             f"left out, for a backup holds no links: {', '.join(links)}; copy what they lead to as well", err=True
         )

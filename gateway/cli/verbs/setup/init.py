@@ -28,6 +28,7 @@ def command(*, name: str, guided: bool | None) -> None:
     asked, too, what changes nothing), which forces; the file is one that `check` accepts.
     """
     from gateway.cli.setup.starter_rig import starter_rig
+    from gateway.processes.durable_file import create_text
     from gateway.profiles import list_shipped
 
     target = Path(name if name.endswith((".yaml", ".yml")) else f"{name}.yaml")
@@ -44,8 +45,7 @@ def command(*, name: str, guided: bool | None) -> None:
     is_guided = sys.stdin.isatty() and sys.stdout.isatty() if guided is None else guided
     text = _ask(target.stem) if is_guided else starter_rig(target.stem)
     try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(text)
+        create_text(target, text)
     except FileExistsError:
         raise already_exists(target, "choose another name") from None
     most = re.search(r"^  force_max_n: ([\d.]+)", text, re.MULTILINE)

@@ -13,22 +13,14 @@ from gateway.recording import RecordingError, list_recordings, read_recording
 from gateway.recording.care.keeping import delete_recording, is_kept, keep_recording, let_recording_go, prune_recordings
 from gateway.recording.care.summaries import list_summaries
 from gateway.recording.label import RecordingLabel
-from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.watch.reference_recording import read_reference_recording
-from tests.disk.drawn.player import Player
-from tests.disk.drawn.recording_laws import broken_rows, spared
+from tests.disk.drawn.players.player import Player
+from tests.disk.drawn.players.recording_laws import broken_rows, marked, out_of_turn, spared
 from tests.service.rigs import demo
 
-FORCE = COLUMNS.index("force_n")
-_REST = (0.0,) * (len(COLUMNS) - FORCE - 1)
 LABELS = ("", "vor der Reparatur", "a/b", "ä 'x' \"y\"")
 FEW_BYTES, MANY_BYTES = 6000, 60_000
-
-
-def row_of(time_s: float, sample: Any, *_: Any) -> tuple[float, ...]:
-    """A row that is known by its number."""
-    return (time_s, 1.0, float(sample.number), *_REST)
 
 
 class RecordingPlayer(Player):
@@ -48,7 +40,11 @@ class RecordingPlayer(Player):
         self.durable: dict[str, int] = {}
         self.recordings: Recordings | None = None
         self.is_wanted = False
-        self.deleted, self.used = set[str](), set[str]()  # used: that had been synced before
+        self.deleted, self.used, self.gone = (
+            set[str](),
+            set[str](),
+            set[str](),
+        )  # used: that had been synced; gone: told so
 
     def begin(self) -> None:
         self.recordings = Recordings(self.path("recordings"), self.rig, self.scene.say)
@@ -123,7 +119,7 @@ class RecordingPlayer(Player):
     def verb(self) -> None:
         """A person at a terminal, or the page."""
         verb: Callable[[], None] = self.rng.choice(
-            [self._list, self._list, self._keep, self._let_go, self._delete, self._prune]
+            [self._list, self._keep, self._keep, self._let_go, self._delete, self._prune]
         )
         try:
             verb()
@@ -134,11 +130,8 @@ class RecordingPlayer(Player):
 
     def _any(self) -> Path:
         with self.disk.aside():
-            paths = (
-                sorted(self.path("recordings").glob("[0-9][0-9][0-9][0-9].fgr"))
-                if self.path("recordings").is_dir()
-                else []
-            )
+            folder = self.path("recordings")
+            paths = sorted(folder.glob("[0-9][0-9][0-9][0-9].fgr")) if folder.is_dir() else []
         return self.rng.choice(paths) if paths else self.path("recordings", "0001.fgr")
 
     def _list(self) -> None:
@@ -165,9 +158,8 @@ class RecordingPlayer(Player):
         is_open = self._is_open(path)
         reference = self.scene.reference
         told, durable = (
-            self.told.pop(path.name, None),
-            self.durable.pop(path.name, None),
-        )  # a refusal may come behind its end
+            kept.pop(path.name, None) for kept in (self.told, self.durable)
+        )  # a refusal may come at its end
         why = delete_recording(path, reference)
         self.scene.note(f"delete {path.name}: {why or 'gone'}")
         if why and told is not None:
@@ -182,6 +174,7 @@ class RecordingPlayer(Player):
             ):
                 self.complain(f"{path.name} was deleted, and had to stay")
             self.deleted.add(path.name)
+            self.gone |= {path.name} if durable is not None else set()
             self.used |= {path.name} if durable is not None else set()
             self._forget(path.name)
             if self._is_there(path):
@@ -216,7 +209,13 @@ class RecordingPlayer(Player):
             must_stay |= self.scene.kept
         refused = len(self.disk.refused)
         try:
-            return prune(state, retention, *rest)
+            pruned = prune(state, retention, *rest)
+            self.gone |= (names := {one.path.name for one in pruned}) & set(self.durable)
+            if len(self.disk.refused) == refused and not self.is_touched:
+                with self.disk.aside():
+                    stay = {*rest[:1]} | marked(self.path("recordings")) | open_before | self.deleted
+                self.complain_if(out_of_turn(before, names, stay))
+            return pruned
         finally:
             after = self._sizes()
             gone = {name for name in before if name not in after}
@@ -267,6 +266,8 @@ class RecordingPlayer(Player):
         if len(summaries) != len(entries):
             self.complain(f"{len(summaries)} are summarised of {len(entries)}")
         if not self.is_touched:
+            if back := self.gone & {entry.path.name for entry in entries}:
+                self.complain(f"{back} were deleted, and are back")
             for words in broken_rows(entries, self.told, set(self.durable), self.number):
                 self.complain(words)
             for entry in entries:

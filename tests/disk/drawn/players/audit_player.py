@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 from gateway.audit.audit_file import AuditFile
 from gateway.audit.audit_log import MOST_WAITING, AuditLog
 from gateway.audit.audit_reader import read_audit, verify_audit
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 
 
 class NotedAuditLog(AuditLog):
@@ -126,6 +126,8 @@ class AuditPlayer(Player):
         """All of this life is there, or counted."""
         self.judge()
         assert self.log
+        self._put(1)
+        self.scene.go_on_all()
         if self.log._waiting or self.log._written or self.log._in_flight:
             self.complain(f"{len(self.log._waiting)} records still wait on a disk that is well")
         records = self._read()

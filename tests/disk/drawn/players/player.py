@@ -40,6 +40,9 @@ class Player(ABC):
     def die(self) -> None:  # noqa: B027
         """The gateway was killed."""
 
+    def close(self) -> None:  # noqa: B027
+        """The scene has ended."""
+
     def lose_power(self) -> None:  # noqa: B027
         """What was not synced may be gone."""
 
@@ -54,6 +57,11 @@ class Player(ABC):
     def complain(self, words: str) -> None:
         """A law did not hold."""
         self.scene.complain(f"{type(self).__name__}: {words}")
+
+    def complain_if(self, words: str) -> None:
+        """The same, where there is something to say."""
+        if words:
+            self.complain(words)
 
     def judge_words(self, sentence: str) -> None:
         """A refusal is a sentence that names what and where."""

@@ -1,13 +1,29 @@
 """What recordings must hold after what was told of them; and what a retention may take: what is too old, and as many bytes as
 there are too many."""
 
+import os
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 from gateway.profiles.recordings_section import Retention
 from gateway.recording import RecordingEntry, read_recording
+from gateway.service.running_rig.recording.recorded_row import COLUMNS
+
+_REST = (0.0,) * (len(COLUMNS) - COLUMNS.index("force_n") - 1)
 
 Sizes = dict[str, tuple[int, float]]
 """Bytes and time of the end (s of the epoch), by the file's name."""
+
+
+def row_of(time_s: float, sample: Any, *_: Any) -> tuple[float, ...]:
+    """A row that is known by its number."""
+    return (time_s, 1.0, float(sample.number), *_REST)
+
+
+def marked(folder: Path) -> set[str]:
+    """Names of the recordings that have the mark of who keeps them."""
+    return {f"{name.removesuffix('.keep')}.fgr" for name in os.listdir(folder) if name.endswith(".keep")}  # noqa: PTH208
 
 
 def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str:
@@ -18,6 +34,13 @@ def spared(before: Sizes, after: Sizes, limits: Retention, wall_s: float) -> str
     if not_old and (limits.bytes is None or total + most <= limits.bytes):
         return f"{not_old} went, {total} bytes are left of {limits}"
     return ""
+
+
+def out_of_turn(before: Sizes, pruned: set[str], protected: set[str]) -> str:
+    """Return what was left and is older than what has gone, in words; empty for nothing, and where a clock was set back."""
+    times = [before[name][1] for name in sorted(before)]
+    older = {name for name in set(before) - pruned - protected if name < max(pruned, default="")}
+    return f"{older} stayed, and newer ones went: {pruned}" if older and times == sorted(times) else ""
 
 
 def broken_rows(entries: list[RecordingEntry], told: dict[str, int], durable: set[str], last: int) -> Iterator[str]:

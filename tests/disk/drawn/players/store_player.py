@@ -8,7 +8,7 @@ from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import NumberedStore, StoreError
 from gateway.plants.store import PlantStore
 from tests.calibrations.coefficients import calibration
-from tests.disk.drawn.player import Player
+from tests.disk.drawn.players.player import Player
 from tests.plants.test_plant_store import numbered
 
 BUILT_IN = calibration(0, number=1000)
@@ -154,6 +154,8 @@ class StorePlayer(Player):
             for entry in entries:
                 if entry.fault:
                     self.judge_words(entry.fault)
+                elif not self._is_whole(entry):
+                    self.complain(f"{entry.number} was altered, and is taken for whole")
             return
         self._judge_selected(selected)
         for entry in entries:
@@ -163,6 +165,11 @@ class StorePlayer(Player):
                 self.complain(f"{entry.number} holds another document")
         if lost := set(self.documents) - there:
             self.complain(f"{sorted(lost)} were stored, and are gone")
+
+    def _is_whole(self, entry: Any) -> bool:
+        """All of it has the mark that it carries."""
+        encode, number, mark = self.store().encode, entry.number, self.mark_of(entry.document)
+        return mark.isdecimal() and encode(entry.document, number) == encode(self.document(int(mark)), number)
 
     def _judge_selected(self, selected: Any) -> None:
         if selected.notes:
@@ -187,7 +194,19 @@ class StorePlayer(Player):
         if selected.selection.number != number or selected.notes:
             self.complain(f"{number} was taken into use: {selected}")
         self.documents[number] = str(self.mark + 1)
+        if not self.is_touched:
+            self._judge_damaged()
         self.possible = {one.after(number) for one in self.possible}
+
+    def _judge_damaged(self) -> None:
+        """The newest selection is torn: the one before it counts, and that is told."""
+        newest = max(self.path(self.folders[0]).glob("active.*[0-9]"), key=lambda path: int(path.suffix[1:]))
+        data = newest.read_bytes()
+        newest.write_bytes(data[: self.rng.randrange(len(data))])
+        selected = self.store().find_selected()
+        newest.write_bytes(data)
+        if selected.selection.number not in {one.active for one in self.possible} or not selected.notes:
+            self.complain(f"{newest.name} is torn, and {selected.selection.number} is in use: {selected.notes}")
 
     def _numbers_there(self) -> set[int]:
         """As the disk has them, by nobody's word but its own."""

@@ -22,9 +22,10 @@ from gateway.watch.reference_recording import (
     read_reference_recording,
     reference_path,
 )
-from tests.disk.drawn.audit_player import AuditPlayer
-from tests.disk.drawn.player import Player
-from tests.disk.drawn.store_player import BUILT_IN, StorePlayer
+from tests.disk.drawn.players.audit_player import AuditPlayer
+from tests.disk.drawn.players.own_words import SECRET
+from tests.disk.drawn.players.player import Player
+from tests.disk.drawn.players.store_player import BUILT_IN, StorePlayer
 
 
 class ReferencePlayer(Player):
@@ -35,7 +36,7 @@ class ReferencePlayer(Player):
     def __init__(self, scene: Any) -> None:
         super().__init__(scene)
         self.possible = {""}
-        self.sources = self.state.parent / "sources"
+        self.sources = scene.unseen / "sources"
         self.sources.mkdir(exist_ok=True)
 
     def act(self) -> None:
@@ -72,6 +73,15 @@ class ReferencePlayer(Player):
             self.complain(f"the reference {there[:6]} is none that was chosen: {[one[:6] for one in self.possible]}")
         self.possible = {there}
 
+    def judge_healed(self) -> None:
+        """Another one is taken."""
+        self.judge()
+        for _ in range(5):
+            self.act()
+        if len(self.possible) != 1:
+            self.complain(f"it takes none on a disk that is well: {self.possible} may be there")
+        self.judge()
+
 
 class CounterPlayer(Player):
     """told: numbers of births since the disk was last seen to refuse one."""
@@ -105,6 +115,12 @@ class CounterPlayer(Player):
 
     def judge(self) -> None: ...
 
+    def judge_healed(self) -> None:
+        """It counts on."""
+        self.act()
+        if self.last is None and not self.is_touched:
+            self.complain("a birth is not kept on a disk that is well")
+
 
 class Onlooker(Player):
     """Copies or packs the whole state directory while others change it."""
@@ -115,7 +131,7 @@ class Onlooker(Player):
         self.rng.choice([self._back_up, self._back_up, self._bundle])()
 
     def _back_up(self) -> None:
-        archive, copy = self.state.parent / "kept.tar.gz", self.state.parent / "copy"
+        archive, copy = self.scene.unseen / "kept.tar.gz", self.scene.unseen / "copy"
         stored = {type(one): set(one.documents) for one in self.scene.players if isinstance(one, StorePlayer)}
         synced = {one for each in self.scene.players if isinstance(each, AuditPlayer) for one in each.synced}
         try:
@@ -147,11 +163,13 @@ class Onlooker(Player):
         return [found.get("calibrations"), found.get("plants")]
 
     def _bundle(self) -> None:
-        parts = collect_parts(self.state, lambda: [("rig.yaml", "name: demo\n")])
+        parts = collect_parts(self.state, lambda: [("rig.yaml", f"name: demo\nweb:\n  token: {SECRET}\n")])
+        if told := [name for name, text in parts.items() if SECRET in text]:
+            self.complain(f"a secret is in {told} of a bundle")
         for text in parts.values():
             if "[Errno" in text or "Traceback" in text:
                 self.complain(f"a bundle's part without a sentence: {text[:200]}")
-        pack_bundle(parts, self.state.parent / "report.tar.gz")
+        pack_bundle(parts, self.scene.unseen / "report.tar.gz")
 
     def judge(self) -> None: ...
 
