@@ -18,6 +18,8 @@ from tests.service.requests.drawn.world import World
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 """What may be another behind a refusal: where, what and why, in three faces."""
 MOST_WORDS, COILS = 125, (5, 15)
+BURST, PER_S = 50.0, 200.0
+"""Requests of one address."""
 ACTS = 1145, 1149
 """Commit, and choice of a slot: what is written there acts, and may change other registers."""
 LARGEST_HELD = 65536 + 1024 + 260
@@ -74,6 +76,7 @@ class Judge:
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
         self.asked: dict[str, list[bytes]] = {}
         """What was executed, by who had asked."""
+        self._rates: dict[str, tuple[float, float]] = {}
         self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
     def follow(self, world: World) -> None:
@@ -110,11 +113,13 @@ class Judge:
 
         def executed(*given: Any) -> Any:
             place, (unit, pdu, peer) = len(self.executed), _request(execute.__name__, given)
-            self.asked.setdefault(peer.identity, []).append(pdu)
             if self._first and place < len(self._first.executed) and (was := self._first.executed[place]).is_idle:
                 self.executed.append(was)
+                self._note_asked(peer, pdu)
                 return was.answer
             before, answer = self.look(), execute(*given)
+            if answer is not None:  # else it was not one whole frame
+                self._note_asked(peer, pdu)
             said = answer[7:] if execute.__name__ == "whole_answer" and answer else answer
             is_idle = answer is not None and self._is_right((unit, pdu, peer), said, before)
             self.executed.append(Executed(answer, is_idle))
@@ -122,11 +127,22 @@ class Judge:
 
         return executed
 
+    def _note_asked(self, peer: Peer, pdu: bytes) -> None:
+        """Nobody who comes by an address asks more often than it may, on however many connections."""
+        self.asked.setdefault(peer.identity, []).append(pdu)
+        if not peer.host[0].isdecimal() or peer.host.startswith("127."):
+            return
+        now_s, (left, at_s) = self._world.clock.now_s, self._rates.get(peer.host, (BURST, 0.0))
+        left = min(BURST, left + (now_s - at_s) * PER_S) - 1.0
+        self._rates[peer.host] = left, now_s
+        if left < -1.0:
+            self.broken.append(f"{peer.host} is answered {-left:.1f} requests more than it may ask, at {now_s:.3f}")
+
     def _is_right(self, request: tuple[int | None, bytes, Peer], answer: bytes, before: Look) -> bool:
         """Judge one request; return whether nothing may come of it."""
         (unit, pdu, peer), after = request, self.look()
         facts = Before(before.command, before.owner, before.word(101))
-        verdict = judge(pdu, self._role_of(peer), peer.identity, facts, int(self._world.rig.supported_bits))
+        verdict = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits)
         if unit is not None and unit not in UNITS:
             verdict = Verdict(frozenset((11,)), is_write=verdict.is_write)
         code = answer[1] if answer[0] & 0x80 else 0
@@ -157,8 +173,7 @@ class Judge:
         """Decide whether a request would clear enable, by the rules."""
         now = self.look()
         facts = Before(now.command, now.owner, now.word(101))
-        known_bits = int(self._world.rig.supported_bits)
-        values = judge(pdu, self._role_of(peer), peer.identity, facts, known_bits).values or now.command
+        values = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits).values or now.command
         return bool(now.word(0) & 1) and not int(values[0]) & 1
 
     def _judge_reason(self, pdu: bytes, about: str) -> None:

@@ -97,9 +97,9 @@ class Scene:
             (self._ask_the_bus, 6),
             (self._overhear, 6),
             (self._come_in_crowds, 14 if self.crowd else 0),
-            (self._meet_strangers, 3),
+            (lambda: self.strangers.act(self._look, _differences), 3),
             (self._call, 6),
-            (self._browse, 5),
+            (lambda: self.browsers.act(self._look, _differences), 5),
             (self._ask_in_pieces, 3),
             (self._ask_many, 3),
             (self._ask_and_not_read, 1),
@@ -152,9 +152,11 @@ class Scene:
         return client.name
 
     def _ask_many(self) -> str:
-        """More at once than are answered in one turn."""
-        client, count = self._someone(), self.draw.choice((5, 20, 44))
-        client.send(b"".join(client.frame(self._drawn(client)) for _ in range(count)))
+        """More at once than are answered in one turn, or one by one more than its address may."""
+        client, count = self._someone(), self.draw.choice((5, 20, 44, 70))
+        frames = [client.frame(self._drawn(client)) for _ in range(count)]
+        for data in frames if count == 70 else (b"".join(frames),):
+            client.send(data)
         return f"{client.name} {count}"
 
     def _ask_and_not_read(self) -> str:
@@ -210,12 +212,6 @@ class Scene:
 
     def _come_in_crowds(self) -> str:
         return self.crowd.act(self.draw, self.world.run) if self.crowd else ""
-
-    def _meet_strangers(self) -> str:
-        return self.strangers.act(self._look, _differences)
-
-    def _browse(self) -> str:
-        return self.browsers.act(self._look, _differences)
 
     def _look(self) -> tuple[Look, int]:
         """And how many requests of masters have been executed."""

@@ -123,6 +123,7 @@ class World(SocketLoop):
         self.settings = ServerSettings(
             units=self.rig.network.units, role=plain_role(self.rig), allow=networks, **settings
         )
+        self.known_bits = 47 | (16 if self.rig.valve else 0) | (64 if self.rig.name in ("demo", "paper-pull") else 0)
         self.plain_role = 2 if self.rig.network.allow_plain_upload else 1
         self.log: list[str] = []
         gate = LogLimiter(lambda cause, told: self.log.append(told))

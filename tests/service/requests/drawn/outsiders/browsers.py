@@ -30,6 +30,7 @@ PATHS = (
     "//", "/metrics", "*", "/events?viewer=a", "/api/v1/recordings", "/api/v1/calibrations", "/api/v1/" + 3000 * "x",
     "/api/v1/command/stop", "/api/v1/command/enable", "/api/v1/alive", "http://evil/", "/api/v1/state?" + 900 * "a=b&",
 )  # fmt: skip
+OPEN = "/login", "/healthz"
 METHODS = ("GET", "GET", "GET", "HEAD", "POST", "PUT", "OPTIONS", "BREW", "DELETE")
 
 
@@ -50,6 +51,7 @@ class Browser:
     def __init__(self, wire: socket.socket) -> None:
         self.wire = wire
         self.statuses: list[int] = []
+        self.may_read = False  # what is answered now may be of an earlier request
         self.is_closed, self.is_spoiled, self.is_stream, self.reads, self.asked = False, False, False, True, 0
 
 
@@ -74,6 +76,7 @@ class Browsers:
         draw, before = self._draw, look()
         browser = draw.choice(self._there) if self._there and draw.random() < 0.4 else self._come()
         data, told = self._drawn(browser)
+        known, is_open = len(browser.statuses), BEARER.encode() in data or any(path in told for path in OPEN)
         at = draw.choice((len(data), len(data), draw.randrange(len(data) + 1)))
         browser.is_spoiled |= at < len(data)
         for piece in (data[: at // 2], data[at // 2 : at]):
@@ -82,6 +85,9 @@ class Browsers:
         self._turn()
         if changes := differences(before, look()):
             self.broken.append(f"{told} changes {changes[:6]}")
+        if not is_open and not browser.may_read and any(200 <= status < 300 for status in browser.statuses[known:]):
+            self.broken.append(f"{told} is answered without the token: {browser.statuses}")
+        browser.may_read |= is_open
         if self._told.sentences:
             self.broken.append(f"{told} makes the log tell {self._told.sentences}")
         if draw.random() < 0.3:

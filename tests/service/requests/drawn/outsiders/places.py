@@ -138,9 +138,9 @@ class Crowd:
         self.members: list[Member] = []
 
     def act(self, draw: Random, run: Callable[[float], None]) -> str:
-        """Some come, from a few addresses; each says nothing, or a bit, or a whole request; some go."""
+        """Some come, from a few addresses; each says nothing, or a bit, or a whole request; some go, some send byte by byte."""
         self.look()
-        how = draw.choice(("come", "come", "say", "say", "say", "go", "wait"))
+        how = draw.choice(("come", "come", "say", "say", "go", "wait", "drip"))
         if how == "come":
             for _ in range(draw.randrange(1, 7)):
                 self._come(draw)
@@ -148,12 +148,23 @@ class Crowd:
             for _ in range(draw.choice((2, 5, 8))):
                 run(0.1)
                 self.look()
+        elif how == "drip":
+            self._drip([one for one in self.members if draw.random() < 0.5], run)
         for member in tuple(self.members):
             if how == "say" and draw.random() < 0.7:
                 self._say(member, draw.choice((1, 1, 3, 11, 12)))
             elif how == "go" and draw.random() < 0.5:
                 self._leave(member)
         return f"{how}, {len(self.members)} are there"
+
+    def _drip(self, members: list[Member], run: Callable[[float], None]) -> None:
+        """A byte at a time, and never the last one."""
+        for _ in range(10):
+            for member in members:
+                if member in self.members and member.said < len(READ) - 1:
+                    self._say(member, 1)
+            run(0.05)
+            self.look()
 
     def fill(self, draw: Random, run: Callable[[float], None]) -> None:
         """Take all places there are, and be silent; then more come."""
@@ -173,7 +184,7 @@ class Crowd:
                 self._places.judge_kept(member.place)
 
     def _come(self, draw: Random) -> None:
-        host = f"{CROWD}{draw.randrange(1, 4)}"
+        host = f"{CROWD}{draw.randrange(1, 6)}"
         wire = self._connect(host, next(self._ports))
         if _is_open(wire):
             self._take(wire, host)
