@@ -98,7 +98,7 @@ class Scene:
             (self._overhear, 6),
             (self._come_in_crowds, 14 if self.crowd else 0),
             (lambda: self.strangers.act(self._look, _differences), 3),
-            (self._call, 6),
+            (self._call, 10),
             (lambda: self.browsers.act(self._look, _differences), 5),
             (self._ask_in_pieces, 3),
             (self._ask_many, 3),

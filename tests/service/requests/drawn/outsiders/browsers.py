@@ -48,8 +48,8 @@ class Told(logging.Handler):
 class Browser:
     """One connection. methods: of the whole requests it has sent; reads: takes what is answered."""
 
-    def __init__(self, wire: socket.socket) -> None:
-        self.wire = wire
+    def __init__(self, wire: socket.socket, now_s: float) -> None:
+        self.wire, self.came_s, self.is_slow = wire, now_s, False
         self.statuses: list[int] = []
         self.may_read = False  # what is answered now may be of an earlier request
         self.is_closed, self.is_spoiled, self.is_stream, self.reads, self.asked = False, False, False, True, 0
@@ -74,6 +74,8 @@ class Browsers:
 
     def act(self, look: Callable[[], Any], differences: Callable[[Any, Any], list[str]]) -> str:
         draw, before = self._draw, look()
+        for _ in range(draw.choice((0, 0, 0, MOST + 1))):
+            self._come().is_slow = draw.random() < 0.5
         browser = draw.choice(self._there) if self._there and draw.random() < 0.4 else self._come()
         data, told = self._drawn(browser)
         known, is_open = len(browser.statuses), BEARER.encode() in data or any(path in told for path in OPEN)
@@ -129,7 +131,7 @@ class Browsers:
                 ("Connection: Upgrade\r\nUpgrade: websocket\r\n", b""),
             )
         )
-        browser.is_spoiled |= bool(more) or method == "BREW"
+        browser.is_spoiled |= browser.is_slow or bool(more) or method == "BREW"
         browser.is_stream |= path.startswith("/events") and bool(token) and method == "GET" and not more
         browser.reads = browser.reads and not (browser.is_stream and draw.random() < 0.6)
         browser.asked += 1
@@ -142,7 +144,7 @@ class Browsers:
         far.setblocking(False)
         ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
         self._world.do(self._world.loop.connect_accepted_socket(self._serve, ours))
-        self._there.append(browser := Browser(far))
+        self._there.append(browser := Browser(far, self._world.clock.now_s))
         return browser
 
     def _send(self, browser: Browser, data: bytes) -> None:
@@ -201,8 +203,14 @@ class Browsers:
                 self.broken.append(f"is answered {data[at - 12 : at + 300]!r}")
 
     def judge_soon(self) -> None:
-        """Whoever asked as HTTP has it, once, and reads, is answered by now; nobody is answered twice."""
+        """Whoever asked as HTTP has it, once, and reads, is answered by now; nobody is answered twice. Who sends byte by byte,
+        or nothing, is not waited for."""
+        for slow in [one for one in self._there if one.is_slow]:
+            self._send(slow, b"X")
         self._turn()
+        now_s = self._world.clock.now_s
+        late = [one for one in self._there if not one.asked and now_s - one.came_s > WHOLE_REQUEST_S + 0.01]
+        self.broken += [f"who came at {one.came_s:.3f} and asks nothing is still there at {now_s:.3f}" for one in late]
         for one in self._there:
             is_plain = not (one.is_spoiled or one.is_stream) and one.reads
             if is_plain and len([each for each in one.statuses if each >= 200]) != one.asked:

@@ -31,6 +31,11 @@ class Caller:
         self.lines, self.rest, self.heard = deque[bytes](), b"", b""
         self.is_spoiled, self.reads, self.was_deaf, self.is_closed, self.is_slow = False, True, False, False, False
 
+    @property
+    def is_owed(self) -> bool:
+        """Whether an answer must be there: of a line that is not whole yet there is none."""
+        return self.reads and len(self.lines) > bool(self.rest) and not self.is_spoiled
+
 
 class Callers:
     """The socket with its server, served by the world's loop, and who asks there."""
@@ -71,7 +76,9 @@ class Callers:
         how = draw.choice(
             (self._come, self._say, self._say, self._say, self._pile, self._endless, self._deafen, self._go)
         )
-        caller = draw.choice(alive) if alive and how != self._come else self._come()
+        for _ in range(draw.randrange(1, 6) if how == self._come else 0):
+            self._come().is_slow = draw.random() < 0.5
+        caller = draw.choice(alive) if alive else self._come()
         if how != self._come:
             how(caller)  # type: ignore[call-arg]
         for slow in [one for one in self._callers if one.is_slow]:
@@ -91,6 +98,8 @@ class Callers:
         wire.connect(self._server._listener.getsockname())  # type: ignore[union-attr]
         self._callers.append(caller := Caller(wire, self._world.clock.now_s))
         self._turn()
+        for each in self._server._callers:  # little is on its way: who takes nothing is soon waited for
+            each._peer.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
         return caller
 
     def _line(self) -> bytes:
@@ -129,6 +138,9 @@ class Callers:
             for _ in range(70):
                 self._send(caller, b"[" * 1000)
                 self._turn(3)
+            self._turn()
+            if caller.reads and not caller.is_closed:
+                self.broken.append("a line without an end is waited for")
 
     def _deafen(self, caller: Caller) -> None:
         """Who asks for much and takes nothing, and then all of it."""
@@ -158,6 +170,8 @@ class Callers:
         for caller in tuple(self._callers):
             if caller.reads:
                 self._take(caller)
+        if len(self._server._callers) > LIMITS.callers:
+            self.broken.append(f"{len(self._server._callers)} callers are served")
         for each in self._server._callers:
             if len(each._unread) + len(each._unsent) > MOST_HELD:
                 self.broken.append(f"{len(each._unread)} and {len(each._unsent)} bytes are held for a caller")
@@ -179,9 +193,11 @@ class Callers:
             self._callers.remove(caller)
 
     def _judge_answer(self, caller: Caller, answer: bytes) -> None:
-        if answer.endswith(b'closed"}'):
-            idle_s = self._world.clock.now_s - caller.spoke_s
-            is_many = b"others are waiting" in answer or b"connections are open" in answer
+        if b"connections are open" in answer:
+            if len(self._callers) <= LIMITS.callers:
+                self.broken.append(f"{answer!r} to one of {len(self._callers)}")
+        elif answer.endswith(b'closed"}'):
+            idle_s, is_many = self._world.clock.now_s - caller.spoke_s, b"others are waiting" in answer
             if not (caller.is_spoiled or caller.was_deaf or idle_s >= (LIMITS.spared_s if is_many else LIMITS.idle_s)):
                 self.broken.append(f"{answer!r} after {idle_s:.3f} s")
         elif not caller.is_spoiled:
@@ -198,7 +214,10 @@ class Callers:
         self.broken += [
             f"a caller is still there {now_s - one.spoke_s:.3f} s after its last whole line" for one in idle
         ]
-        late = [one for one in self._callers if one.reads and len(one.lines) > bool(one.rest) and not one.is_spoiled]
+        for _ in range(TURNS):
+            if not (late := [one for one in self._callers if one.is_owed]):
+                return
+            self._turn(4)
         self.broken += [f"{one.lines[0][:80]!r} is not answered" for one in late]
 
     def close(self) -> None:
