@@ -88,16 +88,8 @@ class Bus:
         """Others speak; pdu: what this line's own master asks for among it, where it does."""
         self._world.run(0.05)
         sent, done = len(self._face.sent), len(self._executed())
-        how, wanted, most = draw.choice(
-            (
-                self._foreign_exchange,
-                self._foreign_exchange,
-                self._given_up,
-                self._spoiled,
-                self._row,
-                self._broadcast_row,
-            )
-        )(draw, pdu)
+        acts = (self._given_up, self._spoiled, self._row, self._broadcast_row, self._stray, self._broken_off)
+        how, wanted, most = draw.choice((self._foreign_exchange, *acts))(draw, pdu)
         self._world.run(0.05)
         answers, executed = self._face.sent[sent:], self._executed()[done:]
         if executed != wanted or len(answers) > most:
@@ -139,6 +131,24 @@ class Bus:
             return f"half {half.hex()}", [], 0
         self.say(frame_of(self.unit, pdu))
         return f"half {half.hex()} and {pdu.hex()}", [pdu], 1
+
+    def _stray(self, draw: Random, pdu: bytes) -> tuple[str, list[bytes], int]:
+        """A line that floats puts a byte or two before a request."""
+        stray = bytes(
+            draw.choice((0, 0xFF, 0x55, FOREIGN[0], draw.randrange(256))) for _ in range(draw.randrange(1, 3))
+        )
+        if not is_whole(pdu) or pdu[0] not in LENGTHS_KNOWN:
+            pdu = struct.pack(">BHH", 3, 100, 2)
+        self.say(stray + frame_of(self.unit, pdu))
+        return f"{stray.hex()} before {pdu.hex()}", [pdu], 1
+
+    def _broken_off(self, draw: Random, _pdu: bytes) -> tuple[str, list[bytes], int]:
+        """What another unit is told, or tells, breaks off behind what looks like a request to this one."""
+        inside = frame_of(draw.choice((self.unit, 0)), START)
+        head = draw.choice((bytes((3, 60)), struct.pack(">BHHB", 16, 0, 30, 60))) + bytes(2 * draw.randrange(3))
+        begun = bytes((draw.choice(FOREIGN),)) + head + inside + bytes(draw.randrange(6))
+        self.say(begun)
+        return f"broken off {begun.hex()}", [], 0
 
     def _spoiled(self, draw: Random, pdu: bytes) -> tuple[str, list[bytes], int]:
         """A request with a byte that was changed on its way."""
