@@ -24,7 +24,7 @@ from tests.service.requests.drawn.tools import Tools
 from tests.service.requests.drawn.world import World
 from tests.service.rigs import demo, with_supervision
 
-STEPS, PAUSES_S = 50, (0.0, 0.001, 0.003, 0.01, 0.05)
+STEPS, PAUSES_S = 70, (0.0, 0.001, 0.003, 0.01, 0.05)
 PRESSING = State.RAMPING, State.HOLDING
 TOOLS, FOREIGN_UNITS = ("web", "mqtt"), (2, 7, 247, 254)
 NARROW, GIVES_WAY_S = {"connections": 8, "per_address": 3, "idle_s": 1.2, "partial_s": 0.3}, 0.5
@@ -93,7 +93,7 @@ class Scene:
         draw = self.draw
         self.beat = self.beat % 65000 + 1
         acts: tuple[tuple[Callable[[], str], int], ...] = (
-            (self._ask, 40),
+            (self._ask, 80),
             (self._ask_the_bus, 6),
             (self._overhear, 6),
             (self._come_in_crowds, 14 if self.crowd else 0),

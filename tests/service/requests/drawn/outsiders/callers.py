@@ -68,6 +68,7 @@ class Callers:
         listener.listen(16)
         server._await_connection()
         server._sweep()
+        self._come().is_slow = True
 
     def act(self, look: Callable[[], Any], differences: Callable[[Any, Any], list[str]]) -> str:
         """What a caller says; nothing but what is answered with ok changes anything."""
@@ -81,8 +82,6 @@ class Callers:
         caller = draw.choice(alive) if alive else self._come()
         if how != self._come:
             how(caller)  # type: ignore[call-arg]
-        for slow in [one for one in self._callers if one.is_slow]:
-            self._send(slow, b"{")
         self._turn()
         fresh = [line for line in self._answers if line not in known]
         is_taken = any(self._answers[line].startswith(b'{"ok": true') for line in fresh)
@@ -208,7 +207,9 @@ class Callers:
 
     def judge_soon(self) -> None:
         """Whoever reads, and has asked for whole lines, has its answers; who asks for nothing is gone after a while."""
-        self.collect()
+        for slow in [one for one in self._callers if one.is_slow]:
+            self._send(slow, b"{")
+        self._turn(4)
         now_s, most_s = self._world.clock.now_s, 1.25 * LIMITS.idle_s + 0.1
         idle = [one for one in self._callers if not one.was_deaf and now_s - one.spoke_s > most_s]
         self.broken += [

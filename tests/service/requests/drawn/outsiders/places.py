@@ -167,11 +167,13 @@ class Crowd:
             self.look()
 
     def fill(self, draw: Random, run: Callable[[float], None]) -> None:
-        """Take all places there are, and be silent; then more come."""
+        """Take all places there are, and be silent; then more come, and half of them send byte by byte."""
         for count in (9, 3):
             for _ in range(count):
                 self._come(draw)
             run(self._places.rules.gives_way_s + 0.3)
+            self.look()
+        self._drip([one for one in self.members if draw.random() < 0.5], run)
 
     def look(self) -> None:
         """See who was closed."""
