@@ -241,7 +241,7 @@ class Scene:
             by.ask(pdu, draw.choice((by.unit, 0)))
         else:
             self.browsers.stop() if by == "http" else self.tools.stop(by)
-        if not isinstance(by, Client) or not by.owed:
+        if not any(one.owed for one in self.clients):  # else what has waited may begin anew behind it
             self._judge_stopped(name)
         return f"{name} {pdu.hex()}"
 
