@@ -262,7 +262,7 @@ class World(SocketLoop):
     def _serve_page(self) -> None:
         context = WebContext(self.stage.state, self.rig.name, True, Link(self.stage))  # type: ignore[arg-type]
         context.__dict__ |= {"profile": self.rig, "questions": Link(self.stage)}
-        self.page = page_server.make_app(context, PageAccess("127.0.0.1", 8080, TOKEN), None)
+        self.page = page_server.make_app(context, PageAccess("127.0.0.1", 8080, TOKEN, clock_s=self.clock.time), None)
         self.mqtt = RegisterCommands(
             self.rig.register_map,
             Link(self.stage),
