@@ -276,7 +276,7 @@ class Connection(asyncio.Protocol):
             self._answered, self._last_answer_s = False, now_s
         elif self._partial_since_s is not None and now_s - self._partial_since_s >= settings.partial_s:
             self._close("partial", f"W233 {self.peer}: a request stayed incomplete for {settings.partial_s:g} s")
-        elif now_s - self._last_answer_s >= settings.idle_s:
+        elif self._partial_since_s is None and now_s - self._last_answer_s >= settings.idle_s:
             self._close("idle", f"{self.peer}: no request for {settings.idle_s:g} s")
 
     def silent_s(self, now_s: float) -> float:

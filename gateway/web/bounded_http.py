@@ -54,6 +54,19 @@ class BoundedHttpProtocol(H11Protocol):
         super().data_received(data)
         self._watch_request()
 
+    def send_400_response(self, msg: str) -> None:
+        """Answer what is no HTTP, where an answer may still be given, and hang up. uvicorn gives one in any case: behind
+        another, or with a body to HEAD; and the application answers as well. To anybody's bad chunk these were errors of this
+        program, with a page of its log each."""
+        waits = self.conn.our_state is h11.SEND_RESPONSE
+        if self.cycle is not None and not self.cycle.response_complete:
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
+        if self.conn.our_state is h11.IDLE or (waits and self.scope["method"] != "HEAD"):
+            super().send_400_response(msg)
+        else:
+            self.transport.close()
+
     def _should_upgrade(self) -> bool:
         """There is no other protocol: an offer may be passed over (RFC 9110, 7.8), and uvicorn would ask for a library."""
         return False

@@ -66,6 +66,17 @@ def test_an_idle_connection_is_closed_and_a_busy_one_is_not(stand: Any, deliver:
     assert (near.ended, far.ended, made.log[0][0]) == ("", "closed", "idle")
 
 
+def test_who_begins_a_request_at_the_end_of_its_idle_time_is_heard_out(stand: Any, deliver: Any) -> None:
+    """The other half of it came a moment later: the request was not executed, and who had just asked was told idle."""
+    made = stand(idle_s=60.0, partial_s=5.0)
+    connection, far = made.connect()
+    made.wait(59.9)
+    deliver(connection, far, framed(READ)[:7])
+    made.wait(1.0)
+    deliver(connection, far, framed(READ)[7:])
+    assert (far.writes, far.ended) == (1, "")
+
+
 def test_a_peer_that_does_not_let_go_is_cut(stand: Any, deliver: Any) -> None:
     made = stand(partial_s=5.0)
     connection, far = made.connect(stuck=True)

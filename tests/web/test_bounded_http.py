@@ -15,10 +15,11 @@ from uvicorn.server import ServerState
 from gateway.web import bounded_http
 
 WHOLE = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
+CHUNKED, BAD_CHUNK = WHOLE[:-2] + b"Transfer-Encoding: chunked\r\n\r\n", b"zz\r\n"
 
 
-async def heard(said: bytes, then: bytes = b"") -> bytes:
-    """What a caller reads until it is hung up on, which says one thing, and then a byte of another again and again."""
+async def connected() -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+    """A caller of a page that answers."""
 
     async def index(request: object) -> PlainTextResponse:
         return PlainTextResponse("here")
@@ -29,7 +30,12 @@ async def heard(said: bytes, then: bytes = b"") -> bytes:
     await asyncio.get_running_loop().connect_accepted_socket(
         lambda: bounded_http.BoundedHttpProtocol(config, ServerState(), {}), ours
     )
-    reader, writer = await asyncio.open_connection(sock=far)
+    return await asyncio.open_connection(sock=far)
+
+
+async def heard(said: bytes, then: bytes = b"") -> bytes:
+    """What a caller reads until it is hung up on, which says one thing, and then a byte of another again and again."""
+    reader, writer = await connected()
     writer.write(said)
 
     async def drip() -> None:
@@ -178,3 +184,32 @@ def test_who_offers_another_protocol_is_answered_in_this_one(upgrade: bytes, cap
     offering = WHOLE[:-2] + b"Connection: Upgrade, close\r\nUpgrade: " + upgrade + b"\r\n\r\n"
     assert b"here" in asyncio.run(heard(offering))
     assert caplog.messages == []
+
+
+@pytest.mark.parametrize(
+    ("said", "answered"),
+    [(b"no HTTP at all\r\n\r\n", 1), (CHUNKED + BAD_CHUNK, 1), (CHUNKED.replace(b"GET", b"HEAD") + BAD_CHUNK, 0)],
+)
+def test_what_turns_out_to_be_no_http_is_answered_once_at_most_and_is_no_fault_of_this_program(
+    said: bytes, answered: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A bad chunk was answered twice: the log told of errors of the application, with their whole tracebacks."""
+    heard_of_it = asyncio.run(heard(said))
+    assert (heard_of_it.count(b"HTTP/1.1 400"), heard_of_it.count(b"HTTP/1.1")) == (answered, answered)
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
+
+
+def test_who_is_answered_and_goes_on_with_no_http_is_hung_up_on_without_a_word(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def scene() -> bytes:
+        reader, writer = await connected()
+        writer.write(CHUNKED)
+        await reader.readuntil(b"here")
+        writer.write(BAD_CHUNK)
+        rest = await reader.read()
+        writer.close()
+        return rest
+
+    assert b"HTTP/1.1" not in asyncio.run(asyncio.wait_for(scene(), 10.0))
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []

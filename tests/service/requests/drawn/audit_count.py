@@ -44,7 +44,8 @@ class AuditCount:
         falls = [FALLS.get(bit, BITS[bit]) for bit in BITS if bit not in RUNS and word & ~now & ~(written or 0) & bit]
         changed = [name for k, name in VALUES.items() if before[k] != after[k]]
         self._wanted.update((who, what) for what in (*edges, *falls, *changed))
-        if owners[0] != owners[1]:
+        is_ended = bool((written or 0) & ~now & 1)  # by control, which has found its lease over, say: not by who writes
+        if owners[0] != owners[1] and not is_ended:
             self._wanted[who, "owner"] += 1
 
     def broken(self) -> list[str]:

@@ -57,8 +57,9 @@ def draw_command(draw: Random, beat: int) -> bytes:
             write_pdu(k, *(draw.choice((0, 0, draw.choice(WORTH))) for _ in range(draw.randrange(1, 4)))),
             read_and_write_pdu(100, 32, 0, *block[:size]),
             read_and_write_pdu(draw.choice(EDGES), draw.choice((1, 4, 125)), 0, *block[:size]),
+            struct.pack(">BHHH", 22, draw.choice((1, 1, 5)), 0xFFFF, draw.choice((300, 1000))),  # bits that are kept
             mask_pdu(0, 0xFFFF & ~word, word),
-            mask_pdu(draw.choice((0, 1, 3, 4)), draw.choice((0, 0xFFFF, 0xFF00)), draw.choice(WORTH)),
+            mask_pdu(draw.choice((0, 1, 1, 3, 4)), draw.choice((0, 0xFFFF, 0xFF00)), draw.choice((*WORTH, 300, 1000))),
             coil_pdu(draw.choice((0, 0, 1, 2, 3, 4, 5, 6, 15, 16, 100)), on=draw.random() < 0.5),
             coils_pdu(
                 draw.choice((0, 0, 1, 3, 9, 100)),

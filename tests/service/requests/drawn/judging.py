@@ -6,16 +6,20 @@ from struct import unpack
 from typing import Any, NamedTuple
 
 from gateway.audit.write_audit import WriteAudit
+from gateway.fieldbus.tls_stream import TlsStream
 from gateway.modbus import Peer
 from tests.fuzz.bank_model import ENABLE
 from tests.service.requests.drawn.audit_count import AuditCount
 from tests.service.requests.drawn.parties import KEEPER
 from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge
+from tests.service.requests.drawn.secure import ROLES
 from tests.service.requests.drawn.world import World
 
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 """What may be another behind a refusal: where, what and why, in three faces."""
 MOST_WORDS, COILS = 125, (5, 15)
+BURST, PER_S = 50.0, 200.0
+"""Requests of one address."""
 ACTS = 1145, 1149
 """Commit, and choice of a slot: what is written there acts, and may change other registers."""
 LARGEST_HELD = 65536 + 1024 + 260
@@ -70,6 +74,9 @@ class Judge:
     def __init__(self, first: "Judge | None" = None) -> None:
         self.broken, self.told, self.audit = list[str](), list[str](), AuditCount()
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
+        self.asked: dict[str, list[bytes]] = {}
+        """What was executed, by who had asked."""
+        self._rates: dict[str, tuple[float, float]] = {}
         self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
     def follow(self, world: World) -> None:
@@ -79,14 +86,16 @@ class Judge:
         writes._put, writes._clock = self.audit.lines.append, world.clock.time  # type: ignore[assignment]
         self._bank.on_write, self._bank.on_refused_write = writes.note_command, writes.note_refusal
         self._bank.staging.on_act = writes.note_act
-        self._writes, ask = writes, world.stage.ask
+        self._writes, server = writes, world.stage.server
+        answer = server.answer
 
-        def asked(line: bytes) -> dict[str, Any]:
-            if (answer := ask(line))["ok"]:
+        def answered(line: bytes, *, has_waited: bool = False) -> Any:
+            given = answer(line, has_waited=has_waited)
+            if json.loads(given if isinstance(given, bytes) else given.result(timeout=0.0))["ok"]:
                 self.audit.note_local(json.loads(line))
-            return answer
+            return given
 
-        world.stage.ask = asked  # type: ignore[method-assign]
+        server.answer = answered  # type: ignore[method-assign]
 
     def look(self) -> Look:
         bank, stage = self._bank, self._world.stage
@@ -103,12 +112,14 @@ class Judge:
         """Wrap a function that executes requests."""
 
         def executed(*given: Any) -> Any:
-            place = len(self.executed)
+            place, (unit, pdu, peer) = len(self.executed), _request(execute.__name__, given)
             if self._first and place < len(self._first.executed) and (was := self._first.executed[place]).is_idle:
                 self.executed.append(was)
+                self._note_asked(peer, pdu)
                 return was.answer
             before, answer = self.look(), execute(*given)
-            unit, pdu, peer = _request(execute.__name__, given)
+            if answer is not None:  # else it was not one whole frame
+                self._note_asked(peer, pdu)
             said = answer[7:] if execute.__name__ == "whole_answer" and answer else answer
             is_idle = answer is not None and self._is_right((unit, pdu, peer), said, before)
             self.executed.append(Executed(answer, is_idle))
@@ -116,11 +127,22 @@ class Judge:
 
         return executed
 
+    def _note_asked(self, peer: Peer, pdu: bytes) -> None:
+        """Nobody who comes by an address asks more often than it may, on however many connections."""
+        self.asked.setdefault(peer.identity, []).append(pdu)
+        if not peer.host[0].isdecimal() or peer.host.startswith("127."):
+            return
+        now_s, (left, at_s) = self._world.clock.now_s, self._rates.get(peer.host, (BURST, 0.0))
+        left = min(BURST, left + (now_s - at_s) * PER_S) - 1.0
+        self._rates[peer.host] = left, now_s
+        if left < -1.0:
+            self.broken.append(f"{peer.host} is answered {-left:.1f} requests more than it may ask, at {now_s:.3f}")
+
     def _is_right(self, request: tuple[int | None, bytes, Peer], answer: bytes, before: Look) -> bool:
         """Judge one request; return whether nothing may come of it."""
         (unit, pdu, peer), after = request, self.look()
         facts = Before(before.command, before.owner, before.word(101))
-        verdict = judge(pdu, int(peer.role), peer.identity, facts, int(self._world.rig.supported_bits))
+        verdict = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits)
         if unit is not None and unit not in UNITS:
             verdict = Verdict(frozenset((11,)), is_write=verdict.is_write)
         code = answer[1] if answer[0] & 0x80 else 0
@@ -142,12 +164,16 @@ class Judge:
         self.told.append(f"  {about}")
         return not verdict.is_write or bool(code and not verdict.is_remembered)
 
+    def _role_of(self, peer: Peer) -> int:
+        """As the certificate says, or the rig."""
+        is_plain = not peer.name and peer.host[0].isdecimal()
+        return ROLES[peer.name] if peer.name in ROLES else self._world.plain_role if is_plain else int(peer.role)
+
     def would_stop(self, pdu: bytes, peer: Peer) -> bool:
         """Decide whether a request would clear enable, by the rules."""
         now = self.look()
         facts = Before(now.command, now.owner, now.word(101))
-        known_bits = int(self._world.rig.supported_bits)
-        values = judge(pdu, int(peer.role), peer.identity, facts, known_bits).values or now.command
+        values = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits).values or now.command
         return bool(now.word(0) & 1) and not int(values[0]) & 1
 
     def _judge_reason(self, pdu: bytes, about: str) -> None:
@@ -165,7 +191,7 @@ class Judge:
             self.broken.append(f"{written} are told to be another's: {about}")
         if before.owner != after.owner or before.word(0) != after.word(0) or before.told != after.told:
             self.is_disturbed |= peer.host != KEEPER
-        if peer.role == 0:
+        if self._role_of(peer) == 0:
             self.broken.append(f"a monitor writes: {about}")
         if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
             self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
@@ -228,15 +254,18 @@ class Judge:
     def _judge_owner(self, now: Look) -> None:
         """Words 116 and 117 tell the address of who owns: 0 of nobody."""
         owner, shown = now.owner or "0.0.0.0", now.word(116) << 16 | now.word(117)
-        told = {"serial:1": 1}.get(owner)
+        told = {"serial:1": 1, "serial:2": 2}.get(owner)
         if owner[0].isdecimal():
             told = int.from_bytes(bytes(map(int, owner.split("."))), "big")
         if told is not None and shown != told:
             self.broken.append(f"owner_ip is {shown:x}, and {owner} owns")
 
     def judge_bounds(self) -> None:
-        for one in self._world.shared.connections:
-            held = len(one._framer) + len(one._transport._waiting)  # type: ignore[attr-defined]
+        for one in self._world.connections:
+            transport: Any = one._transport
+            held = len(one._framer) + len(getattr(transport, "_socket", transport)._waiting)
+            if isinstance(transport, TlsStream):
+                held += transport._incoming.pending + transport._outgoing.pending
             if held > LARGEST_HELD:
                 self.broken.append(f"{held} bytes are held for {one.peer}")
 

@@ -1,16 +1,15 @@
-"""Who asks: clients of Modbus TCP and TLS, the master on the bus. Each counts what it is owed: one answer for each request, in
-order, and soon."""
+"""Who asks: clients of Modbus TCP and TLS. Each counts what it is owed, one answer for each request, in order, and soon;
+none is closed that keeps the rules."""
 
 import struct
 from collections import deque
 from contextlib import suppress
 from random import Random
 
-from gateway.modbus import Peer
-from gateway.modbus.rtu import encode_adu
-from tests.fuzz.frame_model import crc, frames_of
-from tests.service.requests.drawn.reference import is_whole
-from tests.service.requests.drawn.world import RTU_UNIT, World
+from gateway.modbus import Peer, Role
+from tests.fuzz.frame_model import frames_of
+from tests.service.requests.drawn.secure import ROLES
+from tests.service.requests.drawn.world import World
 from tests.simulation.masters.spelling import write_one_pdu, write_pdu
 
 KEEPER = "10.0.0.8"
@@ -20,22 +19,36 @@ BURST, PER_S = 45, 190.0
 
 
 class Client:
-    """One program with one connection at a time. certified: of TLS."""
+    """One program with one connection at a time. certificate: its name, of a client of TLS."""
 
-    def __init__(self, world: World, host: str, certified: Peer | None = None) -> None:
-        self._world, self.host, self.certified = world, host, certified
-        self.peer = certified or Peer(host)
+    def __init__(self, world: World, host: str, certificate: str = "") -> None:
+        self._world, self.host, self.certificate = world, host, certificate
+        self.role = ROLES[certificate] if certificate else world.plain_role
+        self.peer = Peer(host, 5000 if certificate else 0, certificate, Role(self.role))
         self.name = str(self.peer)
         self._ports = iter(range(40000, 60000))
         self.broken: list[str] = []
         self._asked = world.asked.setdefault(host, deque(maxlen=400))
+        self._places = world.secure_places if certificate else world.places
+        self._transaction = 65500 if certificate else 200
         self.connect()
 
     def connect(self) -> None:
+        """Connect anew; whoever finds no room is closed at once."""
         self.owed: deque[tuple[float, int, int, int]] = deque()
         self.heard, self.is_closed, self.reads = b"", False, True
-        self._transaction, self._late_until_s = 0, 0.0
-        self.wire = self._world.connect(self.host, next(self._ports), self.certified)
+        self._late_until_s, self._place = 0.0, None  # type: Place | None
+        self.wire = self._world.connect(self.host, next(self._ports), self.certificate)
+        self.collect()
+        self._place = self._places.take(self.host, not self.is_closed)
+
+    def is_there(self) -> bool:
+        """Whether it has a connection, an old one or a new."""
+        self.collect()
+        if self.is_closed:
+            self.wire.close()
+            self.connect()
+        return not self.is_closed
 
     def frame(self, pdu: bytes, unit: int = 1) -> bytes:
         """A request that is owed an answer from now on."""
@@ -46,6 +59,8 @@ class Client:
         return struct.pack(">HHHB", self._transaction, 0, len(pdu) + 1, unit) + pdu
 
     def send(self, data: bytes) -> None:
+        if self._place:
+            self._place.asked_s = self._world.clock.now_s
         with suppress(OSError):
             sent = self.wire.send(data)
             assert sent == len(data), "a test's own buffer is too small"
@@ -60,11 +75,11 @@ class Client:
             while chunk := self.wire.recv(65536):
                 self.heard += chunk
                 self._world.poll()  # there is room for more
-            self.is_closed = True
+            self._note_closed()
         except BlockingIOError:
             pass
         except OSError:
-            self.is_closed = True
+            self._note_closed()
         frames, is_lost = frames_of(self.heard)
         if is_lost:
             self.broken.append(f"{self.name} is told no Modbus: {self.heard[:40].hex()}")
@@ -76,6 +91,17 @@ class Client:
             _, owed, owed_unit, function = self.owed.popleft()
             if (transaction, unit, pdu[0] & 0x7F) != (owed, owed_unit, function & 0x7F):
                 self.broken.append(f"{self.name} is owed {owed} of {function}, and told {transaction} {pdu.hex()}")
+
+    def _note_closed(self) -> None:
+        self.is_closed = True
+        if self._place:
+            self._places.lose(self._place)
+
+    def forgive(self) -> None:
+        """It has broken the rules, and may be closed at any time."""
+        if self._place:
+            self._places.leave(self._place)
+            self._place = None
 
     def judge_time(self) -> None:
         """Whoever keeps to its rate and reads has its answer soon."""
@@ -91,6 +117,7 @@ class Client:
     def leave(self, draw: Random) -> str:
         """Close, half or wholly, with what is unread (a reset) or without."""
         how = draw.choice(("closes", "shuts", "resets"))
+        self.forgive()
         with suppress(OSError):
             if how == "shuts":
                 self.wire.shutdown(1)
@@ -115,37 +142,3 @@ class Keeper(Client):
     def _send_beat(self) -> None:
         self._beat = self._beat % 65000 + 1
         self.send(self.frame(write_one_pdu(4, self._beat)))
-
-
-class Bus:
-    """The master of the serial line, and whatever else is on it."""
-
-    def __init__(self, world: World) -> None:
-        self._world, self.name, self.broken = world, "bus", list[str]()
-        self.peer = world.bus.settings.peer
-        self.ask(struct.pack(">BHH", 3, 100, 2))
-
-    def ask(self, pdu: bytes, unit: int = RTU_UNIT, noise: bytes = b"") -> None:
-        world = self._world
-        if noise:
-            world.hear(noise)
-            world.run(0.1)
-        count, began_s = len(world.bus_sent), world.clock.now_s
-        world.hear(encode_adu(unit, pdu))
-        world.run(0.03)
-        answers = world.bus_sent[count:]
-        if unit != RTU_UNIT:
-            if answers:
-                self.broken.append(f"unit {unit} is answered {answers}")
-            return
-        if not is_whole(pdu):
-            world.run(0.1)  # what comes soon behind it belongs to it
-            return
-        if len(answers) != 1:
-            self.broken.append(f"{pdu.hex()} behind noise {noise.hex()} has {len(answers)} answers")
-            return
-        (at_s, data) = answers[0]
-        if data[-2:] != crc(data[:-2]) or data[0] != RTU_UNIT or data[1] & 0x7F != pdu[0] & 0x7F:
-            self.broken.append(f"{pdu.hex()} is answered {data.hex()}")
-        if at_s - began_s > SOON_S:
-            self.broken.append(f"{pdu.hex()} is answered after {at_s - began_s} s")

@@ -8,30 +8,34 @@ from random import Random
 
 import pytest
 
-from gateway.modbus import Peer, Role
-from gateway.profiles import Rig
+from gateway.fieldbus import connection
+from gateway.profiles import Rig, load_rig
 from gateway.registers.words import State
+from tests.service.requests.drawn.bus import Bus
 from tests.service.requests.drawn.draws import READ_STATUS, STOPS, Upload, draw_request
-from tests.service.requests.drawn.judging import Judge, differences
-from tests.service.requests.drawn.parties import KEEPER, Bus, Client, Keeper
+from tests.service.requests.drawn.judging import Judge, Look, differences
+from tests.service.requests.drawn.outsiders.browsers import Browsers
+from tests.service.requests.drawn.outsiders.callers import Callers
+from tests.service.requests.drawn.outsiders.places import Crowd
+from tests.service.requests.drawn.outsiders.strangers import Strangers
+from tests.service.requests.drawn.parties import KEEPER, Client, Keeper
 from tests.service.requests.drawn.reference import UNITS
 from tests.service.requests.drawn.tools import Tools
-from tests.service.requests.drawn.world import RTU_UNIT, World
+from tests.service.requests.drawn.world import World
 from tests.service.rigs import demo, with_supervision
 
-STEPS, PAUSES_S = 60, (0.0, 0.001, 0.01, 0.02, 0.1)
+STEPS, PAUSES_S = 70, (0.0, 0.001, 0.003, 0.01, 0.05)
 PRESSING = State.RAMPING, State.HOLDING
-FOREIGN_UNITS = 2, 7, 247, 254
+TOOLS, FOREIGN_UNITS = ("web", "mqtt"), (2, 7, 247, 254)
+NARROW, GIVES_WAY_S = {"connections": 8, "per_address": 3, "idle_s": 1.2, "partial_s": 0.3}, 0.5
+"""Bounds of a face that a crowd comes to, in a time as short as a scene's."""
 
 
 def drawn_rig(draw: Random, *, is_kept: bool) -> Rig:
-    owners = (None, KEEPER, KEEPER) if is_kept else (*[None] * 5, "10.0.0.5", "certificate robot")
-    rig = with_supervision(demo(), lease_s=draw.choice((None, None, 0.35)))
-    network = replace(
-        rig.network,
-        allow_plain_upload=draw.random() < 0.5,
-        owner=draw.choice(owners),
-    )
+    owners = (None, KEEPER, KEEPER) if is_kept else (*[None] * 5, "10.0.0.5", "certificate setpoint")
+    rig = load_rig("paper-pull") if draw.random() < 0.2 else demo()
+    rig = with_supervision(rig, lease_s=draw.choice((None, None, 0.35)))
+    network = replace(rig.network, allow_plain_upload=draw.random() < 0.5, owner=draw.choice(owners))
     return replace(rig, network=network)
 
 
@@ -40,21 +44,32 @@ class Scene:
 
     def __init__(self, seed: int, state: Path, patch: pytest.MonkeyPatch, first: "Scene | None" = None) -> None:
         self.seed, self.draw, self.beat = seed, (draw := Random(seed)), 0
-        is_kept = draw.random() < 0.4
+        is_kept, is_narrow = draw.random() < 0.4, draw.random() < 0.5
         self.judge = Judge(first.judge if first else None)
-        self.world = world = World(state, drawn_rig(draw, is_kept=is_kept), patch, self.judge.judged)
+        if is_narrow:
+            patch.setattr(connection, "GIVES_WAY_S", GIVES_WAY_S)
+        rig, settings = drawn_rig(draw, is_kept=is_kept), NARROW if is_narrow else {}
+        self.world = world = World(state, rig, settings, patch, self.judge.judged)
         self.judge.follow(world)
         self.keeper = Keeper(world) if is_kept else None
         self.keeps = bool(self.keeper) and world.wired.state in PRESSING
         self.clients = [Client(world, *one) for one in self._drawn_clients()]
-        self.bus, self.tools = Bus(world), Tools(world, draw)
-        self.uploads = {name: Upload(draw) for name in (*(one.name for one in self.clients), "bus", "socket")}
+        self.crowd = Crowd(world.places, world.connect, world.clock.time) if is_narrow else None
+        self.buses, self.tools = [self._bus(place) for place in range(draw.randrange(1, 3))], Tools(world, draw)
+        self.strangers, self.callers = Strangers(world, draw), Callers(world, draw, patch)
+        self.browsers = Browsers(world, draw, patch)
+        if self.crowd:
+            self.crowd.fill(draw, world.run)
+        self.uploads = {one.name: Upload(draw) for one in (*self.clients, *self.buses)}
 
-    def _drawn_clients(self) -> list[tuple[str, Peer | None]]:
-        roles = {"panel": Role.MONITOR, "robot": Role.SETPOINT, "plc": Role.CALIBRATION, "chief": Role.ADMIN}
-        plain: list[tuple[str, Peer | None]] = [(host, None) for host in ("10.0.0.5", "10.0.0.6", "127.0.0.1")]
-        tls = [("10.0.0.9", Peer("10.0.0.9", 5000, name=name, role=role)) for name, role in roles.items()]
-        return self.draw.sample(plain, 2) + [*self.draw.sample(tls, 2), tls[0]][:2]  # type: ignore[return-value, arg-type]
+    def _bus(self, place: int) -> Bus:
+        face = self.world.buses[place]
+        return Bus(self.world, face, lambda: self.judge.asked.get(face.server.settings.peer.host, []))
+
+    def _drawn_clients(self) -> list[tuple[str, str]]:
+        plain = [(host, "") for host in ("10.0.0.5", "10.0.0.6", "127.0.0.1")]
+        tls = [("10.0.0.9", name) for name in ("monitor", "setpoint", "calibration", "admin")]
+        return self.draw.sample(plain, 2) + [*self.draw.sample(tls, 2), tls[0]][:2]
 
     def play(self) -> list[str]:
         try:
@@ -67,6 +82,8 @@ class Scene:
             else:
                 self._end()
         finally:
+            self.callers.close()
+            self.browsers.close()
             self.world.close()
         return self.judge.broken
 
@@ -76,8 +93,13 @@ class Scene:
         draw = self.draw
         self.beat = self.beat % 65000 + 1
         acts: tuple[tuple[Callable[[], str], int], ...] = (
-            (self._ask, 40),
+            (self._ask, 80),
             (self._ask_the_bus, 6),
+            (self._overhear, 6),
+            (self._come_in_crowds, 14 if self.crowd else 0),
+            (lambda: self.strangers.act(self._look, _differences), 3),
+            (self._call, 10),
+            (lambda: self.browsers.act(self._look, _differences), 5),
             (self._ask_in_pieces, 3),
             (self._ask_many, 3),
             (self._ask_and_not_read, 1),
@@ -95,8 +117,22 @@ class Scene:
         pdu = draw_request(self.draw, self.beat, self.uploads[client.name])
         return READ_STATUS if self.keeper and self.judge.would_stop(pdu, client.peer) else pdu
 
+    def _call(self) -> str:
+        told = self.callers.act(self._look, _differences)
+        self.judge.is_disturbed |= any(word in told for word in ("calibrat", "plant"))
+        return told
+
+    def _someone(self) -> Client:
+        """One who is connected; whom a crowd keeps out waits until it may."""
+        for _ in range(40):
+            client = self.draw.choice(self.clients)
+            if client.is_there():
+                return client
+            self.world.run(0.1)
+        raise AssertionError("all are kept out, and silent ones give way")
+
     def _ask(self) -> str:
-        client = self.draw.choice(self.clients)
+        client = self._someone()
         client.send(client.frame(self._drawn(client), self._unit()))
         return client.name
 
@@ -104,7 +140,7 @@ class Scene:
         return self.draw.choice(FOREIGN_UNITS if self.draw.random() < 0.04 else UNITS)
 
     def _ask_in_pieces(self) -> str:
-        client = self.draw.choice(self.clients)
+        client = self._someone()
         data = b"".join(client.frame(self._drawn(client)) for _ in range(self.draw.randrange(1, 4)))
         while data:
             at = self.draw.randrange(1, len(data) + 1)
@@ -116,19 +152,23 @@ class Scene:
         return client.name
 
     def _ask_many(self) -> str:
-        """More at once than are answered in one turn."""
-        client, count = self.draw.choice(self.clients), self.draw.choice((5, 20, 44))
-        client.send(b"".join(client.frame(self._drawn(client)) for _ in range(count)))
+        """More at once than are answered in one turn, or one by one more than its address may."""
+        client, count = self._someone(), self.draw.choice((5, 20, 44, 70))
+        frames = [client.frame(self._drawn(client)) for _ in range(count)]
+        for data in frames if count == 70 else (b"".join(frames),):
+            client.send(data)
         return f"{client.name} {count}"
 
     def _ask_and_not_read(self) -> str:
-        client = self.draw.choice(self.clients)
+        client = self._someone()
         client.reads = False
+        client.forgive()
         for _ in range(40):
             client.send(b"".join(client.frame(bytes.fromhex("030064001f")) for _ in range(8)))
             self.world.run(0.005)
             other = self.draw.choice([one for one in self.clients if one is not client])
-            other.send(other.frame(bytes.fromhex("0300640010")))
+            if other.is_there():
+                other.send(other.frame(bytes.fromhex("0300640010")))
             self.judge.judge_bounds()
         client.reads = True
         client.wire.close()
@@ -136,13 +176,14 @@ class Scene:
         return client.name
 
     def _leave(self) -> str:
-        client = self.draw.choice(self.clients)
+        client = self._someone()
         return f"{client.name} {client.leave(self.draw)}"
 
     def _send_no_modbus(self) -> str:
-        client = self.draw.choice(self.clients)
-        client.collect()
-        client.send(
+        client = self._someone()
+        client.forgive()
+        speak = client.wire.send_raw if client.certificate and self.draw.random() < 0.5 else client.send
+        speak(
             self.draw.choice((b"\0\1\0\1\0\6", b"\0\1\0\0\0\1", b"\0\1\0\0\xff\xff", b"GET / HTTP/1.1\r\n")) + bytes(8)
         )
         self.world.run(0.3)
@@ -153,19 +194,33 @@ class Scene:
         client.connect()
         return client.name
 
+    def _of_bus(self, bus: Bus) -> bytes:
+        pdu = draw_request(self.draw, self.beat, self.uploads[bus.name])[:253]
+        return READ_STATUS if self.keeper and self.judge.would_stop(pdu, bus.peer) else pdu
+
     def _ask_the_bus(self) -> str:
-        draw = self.draw
-        pdu = draw_request(draw, self.beat, self.uploads["bus"])[:253]
-        if self.keeper and self.judge.would_stop(pdu, self.bus.peer):
-            pdu = READ_STATUS
+        draw, bus = self.draw, self.draw.choice(self.buses)
+        pdu = self._of_bus(bus)
         noise = draw.randbytes(draw.randrange(1, 20)) if draw.random() < 0.2 else b""
-        self.bus.ask(pdu, draw.choice((*[RTU_UNIT] * 7, 0, 9)), noise)
-        return pdu.hex()
+        cuts = tuple(draw.random() for _ in range(draw.choice((0, 0, 1, 2))))
+        bus.ask(pdu, draw.choice((*[bus.unit] * 7, 0, 9)), noise, cuts)
+        return f"{bus.name} {pdu.hex()}"
+
+    def _overhear(self) -> str:
+        bus = self.draw.choice(self.buses)
+        return bus.overhear(self.draw, self._of_bus(bus))
+
+    def _come_in_crowds(self) -> str:
+        return self.crowd.act(self.draw, self.world.run) if self.crowd else ""
+
+    def _look(self) -> tuple[Look, int]:
+        """And how many requests of masters have been executed."""
+        return self.judge.look(), sum(len(done) for who, done in self.judge.asked.items() if who not in TOOLS)
 
     def _beats(self) -> str:
         """Whoever owns lives a while."""
         for client in self.clients:
-            if client.peer.identity == self.world.bank.owner:
+            if client.peer.identity == self.world.bank.owner and client.is_there():
                 for _ in range(self.draw.randrange(2, 7)):
                     self.beat = self.beat % 65000 + 1
                     client.send(client.frame(b"\6\0\4" + self.beat.to_bytes(2, "big")))
@@ -177,17 +232,18 @@ class Scene:
     def _stop(self) -> str:
         """Whoever owns, and whatever goes on: who may command at all may end it, now."""
         draw = self.draw
-        clients = [one for one in self.clients if (one.certified.role if one.certified else 1) > 0 and not one.owed]
-        pdu, by = draw.choice(STOPS), draw.choice((*clients, "bus", "web", "mqtt"))
+        clients = [one for one in self.clients if one.role > 0 and one.is_there() and not one.owed]
+        pdu, by = draw.choice(STOPS), draw.choice((*clients, self.buses[0], "web", "http", "mqtt"))
+        name = by if isinstance(by, str) else by.name
         if isinstance(by, Client):
             by.send(by.frame(pdu))
-        elif by == "bus":
-            self.bus.ask(pdu, draw.choice((RTU_UNIT, 0)))
+        elif isinstance(by, Bus):
+            by.ask(pdu, draw.choice((by.unit, 0)))
         else:
-            self.tools.stop(by)
-        if by == "bus" or not isinstance(by, Client) or not by.owed:
-            self._judge_stopped(by if isinstance(by, str) else by.name)
-        return f"{by if isinstance(by, str) else by.name} {pdu.hex()}"
+            self.browsers.stop() if by == "http" else self.tools.stop(by)
+        if not any(one.owed for one in self.clients):  # else what has waited may begin anew behind it
+            self._judge_stopped(name)
+        return f"{name} {pdu.hex()}"
 
     def _judge_stopped(self, by: str) -> None:
         state, word = State(self.world.wired.word("state")), self.world.wired.word("control_word")
@@ -204,7 +260,12 @@ class Scene:
         for client in self.clients:
             client.collect()
             client.judge_time()
-        for one in (*self.clients, self.bus, self.tools):
+        self.callers.judge_soon()
+        self.browsers.judge_soon()
+        if self.crowd:
+            self.crowd.look()
+        faces = (self.tools, self.strangers, self.callers, self.browsers, self.world.places, self.world.secure_places)
+        for one in (*self.clients, *self.buses, *faces):
             self.judge.broken += one.broken
         if self.keeper:
             self.keeper.judge_time()
@@ -224,6 +285,11 @@ class Scene:
         self.judge.end()
         owed = [one for one in self.clients if one.owed and not one.is_closed]
         self.judge.broken += [f"{one.name} is owed {len(one.owed)} answers" for one in owed]
+
+
+def _differences(before: tuple[Look, int], after: tuple[Look, int]) -> list[str]:
+    """Where a master's request was executed meanwhile, which had waited, nobody can say whose they are."""
+    return differences(before[0], after[0]) if before[1] == after[1] else []
 
 
 def told(scene: Scene) -> str:

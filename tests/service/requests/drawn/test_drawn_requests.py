@@ -9,7 +9,7 @@ import pytest
 
 from tests.service.requests.drawn.scene import Scene, told
 
-COUNT = 5
+COUNT = 8
 
 
 @pytest.mark.parametrize("first", range(COUNT))

@@ -1,12 +1,13 @@
-"""A wired gateway with all ways in, on one virtual clock: sockets under the gateway's own transport, a serial line,
-control.sock without its socket, the page and MQTT commands in front of it."""
+"""A wired gateway with all ways in, on one virtual clock: sockets under the gateway's own transport, plain and behind TLS,
+serial lines, control.sock, the page and MQTT commands in front of it."""
 
 import asyncio
 import json
-import select
 import socket
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from functools import partial
 from ipaddress import ip_network
 from pathlib import Path
@@ -16,32 +17,39 @@ from typing import Any
 import pytest
 
 from gateway.calibrations.activation import ActiveCalibration
-from gateway.devices import SerialSettings
+from gateway.devices import SerialSettings, ValveHost
 from gateway.fieldbus import ModbusRtuServer, RtuSettings, ServerSettings, connection, rtu_server, socket_transport
 from gateway.fieldbus.connection import Connection, ServerState
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.rate_limits import LogLimiter
-from gateway.fieldbus.socket_transport import ReadySockets, SocketTransport
-from gateway.modbus import Peer
+from gateway.fieldbus.socket_transport import ReadySockets
+from gateway.fieldbus.tls_stream import Handshakes, TlsStream
+from gateway.modbus import Peer, Role
 from gateway.profiles import Rig
 from gateway.service import live_answers
 from gateway.service.running_rig.bank_rules import plain_role
+from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.telemetry.mqtt.register_commands import RegisterCommands
 from gateway.web import server as page_server
 from gateway.web.commands import Commands
 from gateway.web.context import WebContext
 from gateway.web.security import PageAccess
 from gateway.web.tabs import recordings, run_follower
+from tests.certificates import serial_of
 from tests.disk.at_once import AtOnce
-from tests.fieldbus.conftest import HandClock
+from tests.service.requests.drawn.loop import SocketLoop
+from tests.service.requests.drawn.outsiders.places import Places, Rules
+from tests.service.requests.drawn.secure import SecureWire, contexts
 from tests.service.requests.stage import Stage
 from tests.service.wired import STEP_S, Wired
 from tests.web.asgi import Answer, call
 from tests.web.commanded_gateway import Link
 
 TOKEN = "0123456789abcdef0123"
-RTU_UNIT, LINE = 3, SerialSettings(baud=115200)
-POLL_STEPS, BEAT_STEPS, SWEEP_STEPS, MOST_TURNS = 3, 50, 500, 5000
+UNITS, LINE = (3, 5), SerialSettings(baud=115200)
+"""Of the serial lines."""
+POLL_STEPS, BEAT_STEPS = 3, 50
+VALVE_ANSWERS_S = 0.02
 Judge = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
@@ -54,29 +62,49 @@ class NamedSocket(socket.socket):
         return self.address
 
 
-class CertifiedTransport(SocketTransport):
-    """What a connection is told of a client that has shown a certificate; its bytes come as they are."""
+@dataclass
+class SerialFace:
+    """One serial line. sent: to its master, and when."""
 
-    def __init__(self, ready: ReadySockets, wire: socket.socket, protocol: asyncio.Protocol, peer: Peer) -> None:
-        self._peer = peer
-        super().__init__(ready, wire, protocol)
+    server: ModbusRtuServer
+    sent: list[tuple[float, bytes]] = field(default_factory=list)
 
-    def get_extra_info(self, name: str, default: Any = None) -> Any:
-        known = {"modbus_peer": self._peer, "modbus_taken": 1, "modbus_more": False}
-        return known[name] if name in known else super().get_extra_info(name, default)
+    def hear(self, data: bytes, now_s: float) -> None:
+        """Bytes on the line."""
+        self.server._on_bytes(data, now_s)
 
 
-class World:
-    """A rig with its faces. judged: wraps each function that executes a request."""
+class Valve:
+    """The wire to the simulated valve's relay, where the rig has one."""
 
-    def __init__(self, state: Path, rig: Rig, patch: pytest.MonkeyPatch, judged: Judge) -> None:
-        self.stage, self._steps = Stage(state, Wired(rig).ready()), 0
-        self.wired = self.stage.wired
-        self.bank, self.rig = self.wired.bank, self.wired.rig
-        self.clock = HandClock()
-        self.clock.now_s = self.wired.now_s
-        self._soon: list[tuple[Callable[..., None], tuple[Any, ...]]] = []
-        self.errors: list[Any] = []
+    def __init__(self, wired: Wired) -> None:
+        self._wired, self._answers, self._step = wired, deque[tuple[float, bytes]](), wired._step
+        if line := wired.rig.valve:
+            wired._step = self._step_too  # type: ignore[method-assign]
+            wired.loop.valve = ValveExchange(ValveHost(line.device), self._ask, line.device.reply_timeout_s)
+
+    def _ask(self, data: bytes) -> None:
+        now_s = self._wired.now_s
+        self._answers.append((now_s + VALVE_ANSWERS_S, self._wired.world.on_valve_bytes(data, now_s)))
+
+    def _step_too(self) -> None:
+        self._step()
+        while self._answers and self._answers[0][0] <= self._wired.now_s:
+            self._wired.loop.on_valve_bytes(self._answers.popleft()[1], self._wired.now_s)
+
+
+class World(SocketLoop):
+    """A rig with its faces. settings: bounds of those that listen; judged: wraps each function that executes a request."""
+
+    def __init__(
+        self, state: Path, rig: Rig, settings: dict[str, Any], patch: pytest.MonkeyPatch, judged: Judge
+    ) -> None:
+        super().__init__()
+        wired = Wired(rig)
+        Valve(wired)
+        self.stage, self._steps = Stage(state, wired.ready()), 0
+        self.wired, self.bank, self.rig = wired, wired.bank, wired.rig
+        self.clock.now_s = wired.now_s
         self._far: list[socket.socket] = []
         self.on_beat: Callable[[], None] = lambda: None
         self.asked: dict[str, deque[float]] = {}
@@ -86,14 +114,31 @@ class World:
         self._serve_uploads()
         self._patch(patch, judged)
         self.ready = ReadySockets()
+        self._listen(settings)
+        self._serve_lines()
+        self._serve_page()
+
+    def _listen(self, settings: dict[str, Any]) -> None:
         networks = (ip_network("10.0.0.0/8"), ip_network("127.0.0.0/8"))
-        settings = ServerSettings(units=rig.network.units, role=plain_role(rig), allow=networks)
+        self.settings = ServerSettings(
+            units=self.rig.network.units, role=plain_role(self.rig), allow=networks, **settings
+        )
+        self.known_bits = 47 | (16 if self.rig.valve else 0) | (64 if self.rig.name in ("demo", "paper-pull") else 0)
+        self.plain_role = 2 if self.rig.network.allow_plain_upload else 1
         self.log: list[str] = []
         gate = LogLimiter(lambda cause, told: self.log.append(told))
-        peers = Peers(settings, guarded=True)
-        self.shared = ServerState(self.bank, settings, self.clock, gate, peers, self._on_closed)
-        self._serve_bus()
-        self._serve_page()
+        self.shared, self.secure = (
+            ServerState(self.bank, self.settings, self.clock, gate, Peers(self.settings, guarded=True), self._on_closed)
+            for _ in range(2)
+        )
+        revoked, utc = frozenset((serial_of("thief"),)), f"{datetime.now(UTC):%Y%m%d%H%M%S}Z"
+        self.handshakes = Handshakes(lambda: contexts()[0], revoked, lambda: utc)
+        bounds, period_s = self.settings, min(2.0, self.settings.partial_s, self.settings.idle_s) / 4
+        self._sweep_steps = round(period_s / STEP_S)
+        rules = Rules(
+            bounds.connections, bounds.per_address, bounds.idle_s, bounds.partial_s, connection.GIVES_WAY_S, period_s
+        )
+        self.places, self.secure_places = (Places(rules, self.clock.time) for _ in range(2))
 
     # -- what the faces stand on
 
@@ -129,50 +174,35 @@ class World:
         patch.setattr(page_server, "Commands", partial(Commands, clock=self.clock.time, sleep=self._sleep))
 
     def _on_closed(self, peer: Peer) -> None:
-        if peer.identity == self.bank.owner:
+        """As the faces of a running rig do."""
+        if peer.identity == self.bank.owner and all(one.peer.identity != peer.identity for one in self.connections):
             self.wired.loop.owner_connected = False
 
-    # -- as an event loop
+    @property
+    def connections(self) -> tuple[Connection, ...]:
+        return (*self.shared.connections, *self.secure.connections)
 
-    def add_reader(self, descriptor: int, serve: Callable[..., None], *about: Any) -> None:
-        self._descriptor, self._ready = descriptor, (serve, about)
-
-    def remove_reader(self, descriptor: int) -> None:
-        self._descriptor = -1
-
-    def call_soon(self, callback: Callable[..., None], *about: Any) -> None:
-        self._soon.append((callback, about))
-
-    def call_exception_handler(self, context: dict[str, Any]) -> None:
-        self.errors.append(context)
-
-    def poll(self) -> None:
-        """Serve the sockets until none has anything."""
-        for _ in range(MOST_TURNS):
-            soon, self._soon = self._soon, []
-            for callback, about in soon:
-                callback(*about)
-            if self._descriptor >= 0 and select.select([self._descriptor], [], [], 0)[0]:
-                serve, given = self._ready
-                serve(*given)
-            elif not self._soon:
-                return
-        raise AssertionError("the sockets are never done")
+    # -- time
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / STEP_S)):
             self._steps += 1
             self.wired._step()
             self.clock.advance(self.wired.now_s - self.clock.now_s)
-            if self._steps % SWEEP_STEPS == 0:
-                for each in tuple(self.shared.connections):
-                    each.sweep(self.clock.now_s)
-                self.shared.peers.forget(self.clock.now_s)
+            if self._steps % self._sweep_steps == 0:
+                self._sweep()
             if self._steps % POLL_STEPS == 0:
                 self.poll()
             self._wake()
             if self._steps % BEAT_STEPS == 0:
                 self.on_beat()
+
+    def _sweep(self) -> None:
+        for each in self.connections:
+            each.sweep(self.clock.now_s)
+        self.handshakes.sweep(self.clock.now_s)
+        for face in (self.shared, self.secure):
+            face.peers.forget(self.clock.now_s)
 
     async def _sleep(self, seconds: float) -> None:
         waits = self.loop.create_future()
@@ -193,43 +223,46 @@ class World:
 
     # -- the faces
 
-    def connect(self, host: str, port: int, certified: Peer | None) -> socket.socket:
-        """A client's end, which reads without waiting."""
+    def connect(self, host: str, port: int, certificate: str = "") -> Any:
+        """A client's end, which reads without waiting. certificate: that it shows, one of TLS."""
+        far = self.accept(
+            host, port, TlsStream(self.secure, self.handshakes) if certificate else Connection(self.shared)
+        )
+        return SecureWire(far, certificate, self.poll) if certificate else far
+
+    def accept(self, host: str, port: int, protocol: asyncio.Protocol) -> socket.socket:
+        """The far end of a new connection that a face serves by this protocol."""
         ours, far = socket.socketpair()
         wire = NamedSocket(fileno=ours.detach())
         wire.address = host, port
         wire.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8192)
         far.setblocking(False)
         self._far.append(far)
-        protocol = Connection(self.shared)
-        if certified:
-            CertifiedTransport(self.ready, wire, protocol, certified)
-        else:
-            self.ready.add(wire, protocol)
+        self.ready.add(wire, protocol)
         self.poll()
         return far
 
-    def _serve_bus(self) -> None:
-        peer = Peer("serial:1", role=plain_role(self.rig))
-        settings = RtuSettings("/dev/pts/9999", LINE, RTU_UNIT, peer)
-        self.bus = ModbusRtuServer(self.bank, settings, on_peer_closed=self._on_closed, log=lambda _, told: None)
-        self.bus_sent: list[tuple[float, bytes]] = []
-        self.bus.port = SimpleNamespace(  # type: ignore[assignment]
-            write=lambda data: self.bus_sent.append((self.clock.now_s, data)),
+    def _serve_lines(self) -> None:
+        self.buses = [self._line(place, unit) for place, unit in enumerate(UNITS, start=1)]
+
+    def _line(self, place: int, unit: int) -> SerialFace:
+        role = Role(self.plain_role) if place == 1 else Role.MONITOR
+        settings = RtuSettings("/dev/pts/9999", LINE, unit, Peer(f"serial:{place}", role=role))
+        server = ModbusRtuServer(self.bank, settings, on_peer_closed=self._on_closed, log=lambda _, told: None)
+        face = SerialFace(server)
+        server.port = SimpleNamespace(  # type: ignore[assignment]
+            write=lambda data: face.sent.append((self.clock.now_s, data)),
             read_arrived=lambda: None,
             unsent_bytes=0,
             path="bus",
             is_open=True,
         )
-
-    def hear(self, data: bytes) -> None:
-        """Bytes on the bus."""
-        self.bus._on_bytes(data, self.clock.now_s)
+        return face
 
     def _serve_page(self) -> None:
         context = WebContext(self.stage.state, self.rig.name, True, Link(self.stage))  # type: ignore[arg-type]
         context.__dict__ |= {"profile": self.rig, "questions": Link(self.stage)}
-        self.page = page_server.make_app(context, PageAccess("127.0.0.1", 8080, TOKEN), None)
+        self.page = page_server.make_app(context, PageAccess("127.0.0.1", 8080, TOKEN, clock_s=self.clock.time), None)
         self.mqtt = RegisterCommands(
             self.rig.register_map,
             Link(self.stage),
@@ -241,7 +274,7 @@ class World:
         return self.do(call(self.page, method, path, headers, json.dumps(body).encode()))  # type: ignore[no-any-return]
 
     def close(self) -> None:
-        for one in tuple(self.shared.connections):
+        for one in (*self.handshakes.pending, *self.connections):
             one.abort()
         self.poll()
         for far in self._far:
