@@ -76,6 +76,7 @@ class Judge:
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
         self.asked: dict[str, list[bytes]] = {}
         """What was executed, by who had asked."""
+        self.by_host: dict[str, list[Executed]] = {}  # which of two hosts is first in a turn may be another each time
         self._rates: dict[str, tuple[float, float]] = {}
         self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
@@ -112,9 +113,12 @@ class Judge:
         """Wrap a function that executes requests."""
 
         def executed(*given: Any) -> Any:
-            place, (unit, pdu, peer) = len(self.executed), _request(execute.__name__, given)
-            if self._first and place < len(self._first.executed) and (was := self._first.executed[place]).is_idle:
+            unit, pdu, peer = _request(execute.__name__, given)
+            mine = self.by_host.setdefault(str(peer), [])
+            before_me = self._first.by_host.get(str(peer), []) if self._first else []
+            if len(mine) < len(before_me) and (was := before_me[len(mine)]).is_idle:
                 self.executed.append(was)
+                mine.append(was)
                 self._note_asked(peer, pdu)
                 return was.answer
             before, answer = self.look(), execute(*given)
@@ -123,6 +127,7 @@ class Judge:
             said = answer[7:] if execute.__name__ == "whole_answer" and answer else answer
             is_idle = answer is not None and self._is_right((unit, pdu, peer), said, before)
             self.executed.append(Executed(answer, is_idle))
+            mine.append(self.executed[-1])
             return answer
 
         return executed

@@ -171,6 +171,7 @@ class World(SocketLoop):
 
         for module in (page_server, recordings, run_follower):
             patch.setattr(module, "ask_once", ask_once)
+        patch.setattr(page_server, "Standstill", lambda: SimpleNamespace(is_aftermath=lambda: False))
         patch.setattr(page_server, "Commands", partial(Commands, clock=self.clock.time, sleep=self._sleep))
 
     def _on_closed(self, peer: Peer) -> None:
