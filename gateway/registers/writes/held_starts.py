@@ -282,7 +282,8 @@ class HeldEnables:
         self._forget(host)
         if refused := self._refused.get((host, False)):
             self._refused[host, False] = refused._replace(is_let_go=True)
-        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
+        asked = (self._refused.get((host, tares)) for tares in (False, True))
+        if all(one is None or now_s - one.at_s >= LONGEST_CYCLE_S for one in asked):
             self._miss_no_more(host)
 
     def let_go_tare(self, host: str) -> None:
