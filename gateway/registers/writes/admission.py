@@ -41,6 +41,7 @@ TAKE: Final = int(ControlBit.TAKE_OWNERSHIP)
 STARTS: Final = ENABLE | int(RUN_BITS)
 EDGE_BITS: Final = int(ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP)
 RUN_BITS_OR_EDGES: Final = EDGE_BITS | int(RUN_BITS)
+_ASKING: Final = RUN_BITS | TARE
 _BUSY: Final = (RefusalReason.NOT_OWNER, RefusalReason.CALIBRATING, RefusalReason.STOPPING)
 _BEHIND_HEARTBEAT: Final = 2 * HEARTBEAT + 1  # bytes
 _SILENT: Final = (CONTROL_WORD, HEARTBEAT, SEQUENCE)
@@ -223,7 +224,7 @@ class Admission:
         if reason is RefusalReason.NOT_OWNER and CONTROL_WORD in offsets:
             self.held_runs.keep(write.host, self._held_by(write, word, word))
             if write.touched & ~word & ENABLE:
-                self.held_enables.let_go(write.host, now_s)
+                self.held_enables.let_go(write.host, now_s, asks=bool(word & _ASKING))
         if asks or (reason in _BUSY and frame.heartbeat is not None):
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
@@ -240,7 +241,7 @@ class Admission:
         if HEARTBEAT in offsets:
             enables.hear(write.host, heartbeat, _channel(write))
         if is_known and zeros & ENABLE:
-            enables.let_go(write.host, now_s)
+            enables.let_go(write.host, now_s, asks=bool(asked & _ASKING))
         if asked & TARE:
             enables.note_refused(write.host, self._frame(write, heartbeat, asked, tares=True), heartbeat, now_s)
         elif zeros & TARE:

@@ -150,8 +150,7 @@ class HeldEnables:
         self.note_refused_beat(host, frame)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
         moves = self.frames.moves_so_far
-        sent = {**(before.sent if before else {}), frame.channel: _Sent(frame.data, moves)}
-        few = dict(list(sent.items())[-defaults.MOST_FRAMES :])
+        few = dict(list(_sent_alike(before.sent if before else {}, frame, moves).items())[-defaults.MOST_FRAMES :])
         beats = beats or bool(before and before.beats)
         keep_latest(self._refused, (host, frame.tares), _Refused(frame, known, beats, now_s, few, moves))
         if frame.tares and self.has_beaten(host):
@@ -229,9 +228,8 @@ class HeldEnables:
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
-        alike = [channel for channel, other in refused.sent.items() if other.data == frame.data]  # of a pool
-        stands = dict.fromkeys((*alike, frame.channel), _Sent(frame.data, self.frames.moves_so_far))
-        self._refused[key] = refused._replace(at_s=now_s, sent={**refused.sent, **stands})
+        sent = _sent_alike(refused.sent, frame, self.frames.moves_so_far)
+        self._refused[key] = refused._replace(at_s=now_s, sent=sent)
         return True
 
     def knows(self, host: str) -> bool:
@@ -274,16 +272,18 @@ class HeldEnables:
                 self.frames.count_move(host)
             self._find(host)
 
-    def let_go(self, host: str, now_s: float) -> None:
-        """Note that a host has written enable as 0. What was refused, and comes again as soon as only a cycle does, is of a
-        program beside the one that wrote this: it is missed in the next process, too."""
+    def let_go(self, host: str, now_s: float, *, asks: bool = False) -> None:
+        """Note that a host has written enable as 0; asks: beside the bit of a run or a tare, which goes on asking. What was
+        refused, and comes again as soon as only a cycle does, is of a program beside the one that wrote this: it is missed in
+        the next process, too."""
+        self._forget(host)
+        if asks:
+            return
         if host in self.lost:
             self._let_go_s[host] = now_s
-        self._forget(host)
         if refused := self._refused.get((host, False)):
             self._refused[host, False] = refused._replace(is_let_go=True)
-        asked = (self._refused.get((host, tares)) for tares in (False, True))
-        if all(one is None or now_s - one.at_s >= LONGEST_CYCLE_S for one in asked):
+        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
             self._miss_no_more(host)
 
     def let_go_tare(self, host: str) -> None:
@@ -311,3 +311,9 @@ class HeldEnables:
             self._keep_lost(host, beats)
         self.lost = dict(self._lost_now)
         self.by_host.update((host, now_s) for host, held_s in held.items() if 0.0 <= now_s - held_s < _HELD_S + _DOWN_S)
+
+
+def _sent_alike(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
+    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came."""
+    alike = [channel for channel, other in sent.items() if other.data == frame.data]
+    return {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}
