@@ -57,7 +57,7 @@ class EdgeCheck:
         command = proposal.command
         edges = self._commands.edges_of(command)
         if not edges.stops and (
-            busy := self._busy(proposal, edges, at) or _old(command, edges) or self._rises_unbeaten(proposal, at)
+            busy := self._busy(proposal, edges, at) or _old(command, edges) or self._rises_unbeaten(command, at)
         ):
             return busy
         refused = next(self._refusals(command, edges, at), None)  # what has to change first
@@ -91,11 +91,10 @@ class EdgeCheck:
         situation_text = f"{at.applied_n:.1f} N on the way to 0 N, then the output is off"
         return EdgeRefusal(RefusalReason.STOPPING, _WHOLE, f"{asks} refused: {situation_text}; enable again then")
 
-    def _rises_unbeaten(self, proposal: ProposedWrite, at: Situation) -> EdgeRefusal | None:
-        """What is out for a lost master rises with a beat alone, as nothing is enabled without one, and is taken from another
-        one with a beat alone: the frame of a program that stands still asks for its own force for ever, also behind somebody
-        who has lowered it, or has taken over."""
-        command, commands, before = proposal.command, self._commands, self._commands.command
+    def _rises_unbeaten(self, command: Command, at: Situation) -> EdgeRefusal | None:
+        """What is held for a lost master rises with a beat alone, as nothing is enabled without one: the frame of a program
+        that stands still asks for its own force for ever, also behind somebody who has lowered it, or has taken over."""
+        commands, before = self._commands, self._commands.command
         if (
             at.held_n is None
             or (commands.would_have_beaten_since(at.lost_s, at.now_s, command) and not command.repeats)
@@ -105,9 +104,7 @@ class EdgeCheck:
         force_n, voltage_v = command.force_setpoint_n, command.voltage_setpoint_v
         asks_force = force_n != before.force_setpoint_n and force_n > at.held_n + _ROUNDED_N
         stood_v = before.voltage_setpoint_v if before.mode is Mode.VOLTAGE else 0.0
-        asks_voltage = command.mode is Mode.VOLTAGE and voltage_v > stood_v
-        takes = bool(command.control_word & _TAKE) and proposal.owner not in (None, command.peer)
-        if not (asks_force or asks_voltage or takes):
+        if not asks_force and not (command.mode is Mode.VOLTAGE and voltage_v > stood_v):
             return None
         held = f"{at.held_n:.2f} N are held for a lost master and heartbeat = {command.heartbeat} is no new one"
         return EdgeRefusal(RefusalReason.HEARTBEAT_STALE, _WHOLE, f"refused: {held}: write another value with it")

@@ -229,7 +229,7 @@ class Admission:
             self.held_enables.note_refused(write.host, frame, standing, now_s)
         elif frame.heartbeat is not None:
             self.held_enables.note_refused_beat(write.host, frame)
-        if CONTROL_WORD in offsets and word & TARE:
+        if reason is RefusalReason.TARE_REFUSED:
             self.held_enables.note_refused(write.host, frame._replace(tares=True), standing, now_s)
 
     def _hear(self, write: Write, asked: int, heartbeat: int, now_s: float) -> None:
@@ -250,7 +250,7 @@ class Admission:
     # -- why not
 
     def _ask(self, command: Command, values: Values, write: Write) -> None:
-        refused = self.decide(ProposedWrite(command, lambda: self._changes(values), self._ownership.owner))
+        refused = self.decide(ProposedWrite(command, lambda: self._changes(values)))
         if not refused:
             return
         if refused.reason is RefusalReason.FAULT_LATCHED and refused.bit & ENABLE:

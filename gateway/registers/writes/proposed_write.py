@@ -14,12 +14,10 @@ from gateway.registers.words import ControlBit
 
 class ProposedWrite(NamedTuple):
     """A write that would be taken. command: as it would be handed on; changes: tells the names of the registers that it would
-    change, control_word, heartbeat and command_sequence apart (most writes are taken without anybody asking for them); owner:
-    of the setpoint so far."""
+    change, control_word, heartbeat and command_sequence apart (most writes are taken without anybody asking for them)."""
 
     command: Command
     changes: Callable[[], tuple[str, ...]] = tuple
-    owner: str | None = None
 
 
 class EdgeRefusal(NamedTuple):
