@@ -130,10 +130,12 @@ class HeldEnables:
             self._keep_lost(host, (*self.frames.of(host), *self.beats_of(host), heartbeat))
 
     def _keep_lost(self, host: str, beats: Sequence[int]) -> None:
-        """Add to the heartbeats with which a host was lost: of a program with several frames each brings its own."""
+        """Add to the heartbeats with which a host was lost: of a program with several frames each brings its own. The
+        latest stay: who connects anew for each frame has had more of them than are kept."""
         known = self._lost_now.get(host, [])
-        if fresh := [beat for beat in dict.fromkeys(beats) if beat not in known]:
-            keep_latest(self._lost_now, host, [*known, *fresh][-defaults.MOST_FRAMES :])
+        latest = list(dict.fromkeys((*reversed(beats), *reversed(known))))[: defaults.MOST_FRAMES]
+        if set(latest) != set(known):
+            keep_latest(self._lost_now, host, latest[::-1])
             self.on_lost(dict(self._lost_now))
 
     def note_refused(self, host: str, frame: StartFrame, standing: int, now_s: float) -> None:

@@ -66,6 +66,8 @@ class Laws:
             return
         if program.note_beat(frame):
             self.meant(host)
+        elif program.is_live:  # its first cycle has not come to its heartbeat yet
+            self.moved_s.setdefault(host, now_s)
         state, owner, accepted = rig.loop.decision.state, rig.bank.owner, rig.loop.decision.force_accepted_n
         self.writes += 1
         stopped_at = max((at for other, at in self.stopped_at.items() if other != host), default=-1)
