@@ -17,7 +17,7 @@ from tests.service.requests.drawn.world import World
 
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 """What may be another behind a refusal: where, what and why, in three faces."""
-MOST_WORDS, COILS = 125, (5, 15)
+MOST_WORDS, COILS, READ_AND_WRITE = 125, (5, 15), b"\x17"
 BURST, PER_S = 50.0, 200.0
 """Requests of one address."""
 ACTS = 1145, 1149
@@ -50,8 +50,10 @@ class Look(NamedTuple):
 
 
 class Executed(NamedTuple):
-    """What a face was given for one request. is_idle: nothing may come of it, so that it can be left out."""
+    """What a face was given for one request. asked: when, by whom, of which unit, what; is_idle: nothing may come of it, so it
+    can be left out."""
 
+    asked: tuple[float, str, int | None, bytes]
     answer: bytes | None
     is_idle: bool
 
@@ -76,7 +78,6 @@ class Judge:
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
         self.asked: dict[str, list[bytes]] = {}
         """What was executed, by who had asked."""
-        self.by_host: dict[str, list[Executed]] = {}  # which of two hosts is first in a turn may be another each time
         self._rates: dict[str, tuple[float, float]] = {}
         self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
@@ -114,23 +115,31 @@ class Judge:
 
         def executed(*given: Any) -> Any:
             unit, pdu, peer = _request(execute.__name__, given)
-            mine = self.by_host.setdefault(str(peer), [])
-            before_me = self._first.by_host.get(str(peer), []) if self._first else []
-            if len(mine) < len(before_me) and (was := before_me[len(mine)]).is_idle:
+            asked = self._world.clock.now_s, str(peer), unit, pdu
+            was = self._was(asked)
+            if was and was.is_idle:
                 self.executed.append(was)
-                mine.append(was)
                 self._note_asked(peer, pdu)
                 return was.answer
             before, answer = self.look(), execute(*given)
+            if was and answer != was.answer and pdu[:1] != READ_AND_WRITE:  # which may read what was refused last
+                self.broken.append(f"{asked} is answered {answer!r}, and was {was.answer!r}")
             if answer is not None:  # else it was not one whole frame
                 self._note_asked(peer, pdu)
             said = answer[7:] if execute.__name__ == "whole_answer" and answer else answer
             is_idle = answer is not None and self._is_right((unit, pdu, peer), said, before)
-            self.executed.append(Executed(answer, is_idle))
-            mine.append(self.executed[-1])
+            self.executed.append(Executed(asked, answer, is_idle))
             return answer
 
         return executed
+
+    def _was(self, asked: tuple[float, str, int | None, bytes]) -> Executed | None:
+        """What was executed in its place in the play before, which must be the same request; None in a first play."""
+        place, before = len(self.executed), self._first.executed if self._first else []
+        was = before[place] if place < len(before) else None
+        if self._first and (was is None or was.asked != asked):
+            self.broken.append(f"{asked} is asked, and was {was and was.asked}: the plays are not the same")
+        return was
 
     def _note_asked(self, peer: Peer, pdu: bytes) -> None:
         """Nobody who comes by an address asks more often than it may, on however many connections."""
@@ -278,6 +287,8 @@ class Judge:
         self._writes.close()
         if self._first is None:
             self.broken += self.audit.broken()
+        elif len(self.executed) != len(self._first.executed):
+            self.broken.append(f"{len(self.executed)} are executed, and were {len(self._first.executed)}")
 
 
 def _request(name: str, given: tuple[Any, ...]) -> tuple[int | None, bytes, Peer]:
