@@ -10,8 +10,9 @@ from gateway.fieldbus.tls_stream import TlsStream
 from gateway.modbus import Peer
 from tests.fuzz.bank_model import ENABLE
 from tests.service.requests.drawn.audit_count import AuditCount
+from tests.service.requests.drawn.looks import Look, changed_words, differences
 from tests.service.requests.drawn.parties import KEEPER
-from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge
+from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge, when_lost
 from tests.service.requests.drawn.secure import ROLES
 from tests.service.requests.drawn.world import World
 
@@ -27,28 +28,6 @@ LIVE = {"accepted_n": 240, "applied_n": 242, "requested_n": 238, "voltage_v": 24
 """Fields of the state in words that stand in float registers, too."""
 
 
-class Look(NamedTuple):
-    """All that a request could change. words: the registers, but for those of the last refusal;
-    told: of upload, recording and run."""
-
-    words: bytes
-    owner: str | None
-    writers: dict[str, Any]
-    asked_v: float
-    told: str
-
-    @property
-    def command(self) -> list[float]:
-        """The command block, in the registers' units."""
-        return list(unpack(">16f", self.words[400:464]))
-
-    def word(self, address: int) -> int:
-        return int.from_bytes(self.words[2 * address : 2 * address + 2], "big")
-
-    def number(self, address: int) -> float:
-        return float(unpack(">f", self.words[2 * address : 2 * address + 4])[0])
-
-
 class Executed(NamedTuple):
     """What a face was given for one request. asked: when, by whom, of which unit, what; is_idle: nothing may come of it, so it
     can be left out."""
@@ -56,18 +35,6 @@ class Executed(NamedTuple):
     asked: tuple[float, str, int | None, bytes]
     answer: bytes | None
     is_idle: bool
-
-
-def changed_words(before: Look, after: Look) -> list[int]:
-    if before.words == after.words:
-        return []
-    return [k // 2 for k in range(0, len(before.words), 2) if before.words[k : k + 2] != after.words[k : k + 2]]
-
-
-def differences(before: Look, after: Look) -> list[str]:
-    facts = zip(Look._fields[1:], before[1:], after[1:], strict=True)
-    told = [f"{name}: {was} -> {now}" for name, was, now in facts if was != now]
-    return told + [f"register {k}: {before.word(k):x} -> {after.word(k):x}" for k in changed_words(before, after)]
 
 
 class Judge:
@@ -207,8 +174,16 @@ class Judge:
             self.is_disturbed |= peer.host != KEEPER
         if self._role_of(peer) == 0:
             self.broken.append(f"a monitor writes: {about}")
-        if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
-            self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
+        values, has_lease = verdict.values, self._world.rig.control.supervision.lease_s is not None
+        if values is not None and verdict.codes == OK:
+            is_lost = (
+                has_lease and int(values[0]) & ENABLE and not after.word(0) & ENABLE
+            )  # its lease was over: found now
+            if after.command != (when_lost(values) if is_lost else values):
+                self.broken.append(f"is {after.command}, by the rules {values}: {about}")
+            if is_lost:
+                self.audit.note_accepted(peer, (before.command, values), verdict.written, (before.owner, before.owner))
+                return
         is_no_stop = verdict.written is None or verdict.written & ENABLE
         if before.word(101) == CALIBRATING != after.word(101) and is_no_stop:
             return  # a run has ended meanwhile, and took its setpoints and owner along

@@ -17,7 +17,7 @@ WRITES = 5, 6, 15, 16, 22, 23
 OK, BY_STATE = frozenset((0,)), frozenset((0, 3, 4, 6))
 STAGING, STAGING_READ_ONLY = (1000, 1199), (1146, 1147, 1148)
 UNITS = 0, 1, 255
-PAYLOAD, MOST_PAYLOAD_G = 9, 10000
+FORCE, PAYLOAD, MOST_PAYLOAD_G = 1, 9, 10000
 VOLTAGE, MOST_MV = 5, 8500
 """As the rig has it: the range of its cell is 98.07 N."""
 
@@ -106,6 +106,11 @@ def judge(pdu: bytes, role: int, host: str, before: Before, known_bits: int) -> 
     keeps_values = is_write and not (reference.is_open and (reference.written or 0) & (RUNS | TAKE | ENABLE))
     values = [single(value) for value in reference.values] if keeps_values and before.state != CALIBRATING else None
     return Verdict(codes, values, reference.written, is_write, reference.is_remembered)
+
+
+def when_lost(values: list[float]) -> list[float]:
+    """Return what the end of its lease leaves of an owner's command block."""
+    return [0.0 if k in (0, FORCE, VOLTAGE) else value for k, value in enumerate(values)]
 
 
 def is_whole(pdu: bytes) -> bool:
