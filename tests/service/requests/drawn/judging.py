@@ -21,6 +21,7 @@ REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 MOST_WORDS, COILS, READ_AND_WRITE = 125, (5, 15), b"\x17"
 BURST, PER_S = 50.0, 200.0
 """Requests of one address."""
+FAULT_CODE, MASTER_LOST = 110, 1
 ACTS = 1145, 1149
 """Commit, and choice of a slot: what is written there acts, and may change other registers."""
 LARGEST_HELD = 65536 + 1024 + 260
@@ -122,7 +123,7 @@ class Judge:
     def _is_right(self, request: tuple[int | None, bytes, Peer], answer: bytes, before: Look) -> bool:
         """Judge one request; return whether nothing may come of it."""
         (unit, pdu, peer), after = request, self.look()
-        facts = Before(before.command, before.owner, before.word(101))
+        facts = self._facts(before)
         verdict = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits)
         if unit is not None and unit not in UNITS:
             verdict = Verdict(frozenset((11,)), is_write=verdict.is_write)
@@ -150,11 +151,16 @@ class Judge:
         is_plain = not peer.name and peer.host[0].isdecimal()
         return ROLES[peer.name] if peer.name in ROLES else self._world.plain_role if is_plain else int(peer.role)
 
+    def _facts(self, look: Look) -> Before:
+        return Before(look.command, look.owner, look.word(101), self._world.wired.controller.most_pull_n())
+
     def would_stop(self, pdu: bytes, peer: Peer) -> bool:
         """Decide whether a request would clear enable, by the rules."""
         now = self.look()
-        facts = Before(now.command, now.owner, now.word(101))
-        values = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits).values or now.command
+        values = (
+            judge(pdu, self._role_of(peer), peer.identity, self._facts(now), self._world.known_bits).values
+            or now.command
+        )
         return bool(now.word(0) & 1) and not int(values[0]) & 1
 
     def _judge_reason(self, pdu: bytes, about: str) -> None:
@@ -174,11 +180,11 @@ class Judge:
             self.is_disturbed |= peer.host != KEEPER
         if self._role_of(peer) == 0:
             self.broken.append(f"a monitor writes: {about}")
-        values, has_lease = verdict.values, self._world.rig.control.supervision.lease_s is not None
+        values = verdict.values
         if values is not None and verdict.codes == OK:
             is_lost = (
-                has_lease and int(values[0]) & ENABLE and not after.word(0) & ENABLE
-            )  # its lease was over: found now
+                before.word(FAULT_CODE) != MASTER_LOST == after.word(FAULT_CODE)
+            )  # control finds its lease over now
             if after.command != (when_lost(values) if is_lost else values):
                 self.broken.append(f"is {after.command}, by the rules {values}: {about}")
             if is_lost:
