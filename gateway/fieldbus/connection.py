@@ -62,7 +62,7 @@ class Clock(Protocol):
 
 @dataclass(slots=True)
 class ServerState:
-    """State that all connections of one server share."""
+    """State that all connections of one server share. connections: in the order in which they came, and are looked at."""
 
     bank: DataBank
     settings: ServerSettings
@@ -70,7 +70,7 @@ class ServerState:
     log: LogLimiter
     peers: Peers
     on_peer_closed: Callable[[Peer], None]
-    connections: set["Connection"] = field(default_factory=set)
+    connections: dict["Connection", None] = field(default_factory=dict)
     on_last_gone: Callable[[], None] = lambda: None
     closing: bool = False
 
@@ -128,7 +128,7 @@ class Connection(asyncio.Protocol):
         self._admitted = True
         self._last_answer_s = now_s
         shared.peers.join(self.peer.host)
-        shared.connections.add(self)
+        shared.connections[self] = None
         self._rate = shared.peers.rate(self.peer.host, now_s)
         is_plain = self._transport.get_extra_info("modbus_taken") is None  # of TLS one whole frame may be one of a pile
         self._is_unlimited = self._rate is None and is_plain
@@ -322,7 +322,7 @@ class Connection(asyncio.Protocol):
         if not self._admitted:
             return
         self._stop()
-        self._shared.connections.discard(self)
+        self._shared.connections.pop(self, None)
         self._shared.peers.leave(self.peer.host)
         if not any(other.peer.identity == self.peer.identity for other in self._shared.connections):
             self._shared.on_peer_closed(self.peer)

@@ -37,12 +37,13 @@ _BYTES_FOR_ONE: Final = 100
 
 @dataclass(slots=True)
 class Handshakes:
-    """What all connections of one TLS face share. utc: the time of now as certificates have it (YYYYMMDDHHMMSSZ)."""
+    """What all connections of one TLS face share. utc: the time of now as certificates have it (YYYYMMDDHHMMSSZ). pending:
+    in the order in which they came."""
 
     make_context: Callable[[], ssl.SSLContext]
     revoked: frozenset[str]
     utc: Callable[[], str]
-    pending: set["TlsStream"] = field(default_factory=set)
+    pending: dict["TlsStream", None] = field(default_factory=dict)
     rates: dict[str, RequestRate] = field(default_factory=dict)
     context: ssl.SSLContext = field(init=False)
 
@@ -104,7 +105,7 @@ class TlsStream(asyncio.Protocol):
             return
         self._incoming, self._outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
         self._tls = self._handshakes.context.wrap_bio(self._incoming, self._outgoing, server_side=True)
-        self._handshakes.pending.add(self)
+        self._handshakes.pending[self] = None
 
     def data_received(self, data: bytes) -> None:
         """Take encrypted bytes on."""
@@ -135,7 +136,7 @@ class TlsStream(asyncio.Protocol):
     def connection_lost(self, error: Exception | None) -> None:
         """Give everything back."""
         self._is_closing = True
-        self._handshakes.pending.discard(self)
+        self._handshakes.pending.pop(self, None)
         connection, self._connection = self._connection, None
         if connection is not None:
             connection.connection_lost(error)
@@ -201,7 +202,7 @@ class TlsStream(asyncio.Protocol):
     def abort(self) -> None:
         """Cut the connection."""
         self._is_closing = True
-        self._handshakes.pending.discard(self)
+        self._handshakes.pending.pop(self, None)
         self._socket.abort()
 
     # -- between the two
@@ -235,7 +236,7 @@ class TlsStream(asyncio.Protocol):
         if (refusal := certificate_refusal(shown, self._handshakes.revoked, self._handshakes.utc())) is not None:
             self._fail(refusal)
             return
-        self._handshakes.pending.discard(self)
+        self._handshakes.pending.pop(self, None)
         self.peer = Peer(self.peer.host, self.peer.port, shown.name, ROLES[str(shown.role)])
         connection = self._connection = Connection(self._shared)
         connection.connection_made(cast(asyncio.Transport, self))
@@ -277,7 +278,7 @@ class TlsStream(asyncio.Protocol):
         code, _, text = sentence.partition(" ")
         self._shared.log(f"handshake {code}", f"{code} {self.peer}: {text}", self._shared.clock.time())
         self._is_closing = True
-        self._handshakes.pending.discard(self)
+        self._handshakes.pending.pop(self, None)
         self._socket.close()
 
     def _refuse(self, cause: str, sentence: str) -> None:

@@ -66,6 +66,20 @@ def test_an_idle_connection_is_closed_and_a_busy_one_is_not(stand: Any, deliver:
     assert (near.ended, far.ended, made.log[0][0]) == ("", "closed", "idle")
 
 
+def test_connections_are_looked_at_in_the_order_in_which_they_came(stand: Any) -> None:
+    """By their places in memory the log, and the masters that are shown, had another order in each process."""
+    made = stand(idle_s=60.0)
+    ports = list(range(40020, 40000, -1))
+    ends = [made.connect(port=port) for port in ports]
+    assert [one.peer.port for one in made.shared.connections] == ports
+    ends[3][1].close()
+    made.wait(60.5)
+    assert len(made.log) == 10  # of a cause and second
+    assert [sentence.split(":")[1] for _, sentence in made.log] == [str(port) for port in ports if port != ports[3]][
+        :10
+    ]
+
+
 def test_who_begins_a_request_at_the_end_of_its_idle_time_is_heard_out(stand: Any, deliver: Any) -> None:
     """The other half of it came a moment later: the request was not executed, and who had just asked was told idle."""
     made = stand(idle_s=60.0, partial_s=5.0)

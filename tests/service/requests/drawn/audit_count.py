@@ -38,10 +38,11 @@ class AuditCount:
     ) -> None:
         """values: of the command block before and behind it."""
         before, after = values
-        # a bit that is written as 1 and reads 0 has fallen by the end of a run
+        # a bit that is written as 1 and reads 0 has fallen by the end of a run; who clears enable clears all
         who, word, now = _name(str(peer)), int(before[0]), int(after[0])
         edges = [BITS[bit] for bit in BITS if (now & ~word | (written or 0) & MOMENTARY) & bit]
-        falls = [FALLS.get(bit, BITS[bit]) for bit in BITS if bit not in RUNS and word & ~now & ~(written or 0) & bit]
+        fell = word & ~now & (word if written is not None and word & ~written & 1 else ~(written or 0))
+        falls = [FALLS.get(bit, BITS[bit]) for bit in BITS if bit not in RUNS and fell & bit]
         changed = [name for k, name in VALUES.items() if before[k] != after[k]]
         self._wanted.update((who, what) for what in (*edges, *falls, *changed))
         is_ended = bool((written or 0) & ~now & 1)  # by control, which has found its lease over, say: not by who writes

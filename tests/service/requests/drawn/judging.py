@@ -10,16 +10,18 @@ from gateway.fieldbus.tls_stream import TlsStream
 from gateway.modbus import Peer
 from tests.fuzz.bank_model import ENABLE
 from tests.service.requests.drawn.audit_count import AuditCount
+from tests.service.requests.drawn.looks import Look, changed_words, differences
 from tests.service.requests.drawn.parties import KEEPER
-from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge
+from tests.service.requests.drawn.reference import CALIBRATING, OK, STAGING, UNITS, Before, Verdict, judge, when_lost
 from tests.service.requests.drawn.secure import ROLES
 from tests.service.requests.drawn.world import World
 
 REFUSAL_WORDS = ((118, 4), (268, 8), (368, 8))
 """What may be another behind a refusal: where, what and why, in three faces."""
-MOST_WORDS, COILS = 125, (5, 15)
+MOST_WORDS, COILS, READ_AND_WRITE = 125, (5, 15), b"\x17"
 BURST, PER_S = 50.0, 200.0
 """Requests of one address."""
+FAULT_CODE, MASTER_LOST = 110, 1
 ACTS = 1145, 1149
 """Commit, and choice of a slot: what is written there acts, and may change other registers."""
 LARGEST_HELD = 65536 + 1024 + 260
@@ -27,45 +29,13 @@ LIVE = {"accepted_n": 240, "applied_n": 242, "requested_n": 238, "voltage_v": 24
 """Fields of the state in words that stand in float registers, too."""
 
 
-class Look(NamedTuple):
-    """All that a request could change. words: the registers, but for those of the last refusal;
-    told: of upload, recording and run."""
-
-    words: bytes
-    owner: str | None
-    writers: dict[str, Any]
-    asked_v: float
-    told: str
-
-    @property
-    def command(self) -> list[float]:
-        """The command block, in the registers' units."""
-        return list(unpack(">16f", self.words[400:464]))
-
-    def word(self, address: int) -> int:
-        return int.from_bytes(self.words[2 * address : 2 * address + 2], "big")
-
-    def number(self, address: int) -> float:
-        return float(unpack(">f", self.words[2 * address : 2 * address + 4])[0])
-
-
 class Executed(NamedTuple):
-    """What a face was given for one request. is_idle: nothing may come of it, so that it can be left out."""
+    """What a face was given for one request. asked: when, by whom, of which unit, what; is_idle: nothing may come of it, so it
+    can be left out."""
 
+    asked: tuple[float, str, int | None, bytes]
     answer: bytes | None
     is_idle: bool
-
-
-def changed_words(before: Look, after: Look) -> list[int]:
-    if before.words == after.words:
-        return []
-    return [k // 2 for k in range(0, len(before.words), 2) if before.words[k : k + 2] != after.words[k : k + 2]]
-
-
-def differences(before: Look, after: Look) -> list[str]:
-    facts = zip(Look._fields[1:], before[1:], after[1:], strict=True)
-    told = [f"{name}: {was} -> {now}" for name, was, now in facts if was != now]
-    return told + [f"register {k}: {before.word(k):x} -> {after.word(k):x}" for k in changed_words(before, after)]
 
 
 class Judge:
@@ -76,7 +46,6 @@ class Judge:
         self.executed, self.looks, self._first = list[Executed](), list[Look](), first
         self.asked: dict[str, list[bytes]] = {}
         """What was executed, by who had asked."""
-        self.by_host: dict[str, list[Executed]] = {}  # which of two hosts is first in a turn may be another each time
         self._rates: dict[str, tuple[float, float]] = {}
         self.is_disturbed = False  # somebody has ended what the keeper holds, or exchanged what it is held by
 
@@ -114,23 +83,31 @@ class Judge:
 
         def executed(*given: Any) -> Any:
             unit, pdu, peer = _request(execute.__name__, given)
-            mine = self.by_host.setdefault(str(peer), [])
-            before_me = self._first.by_host.get(str(peer), []) if self._first else []
-            if len(mine) < len(before_me) and (was := before_me[len(mine)]).is_idle:
+            asked = self._world.clock.now_s, str(peer), unit, pdu
+            was = self._was(asked)
+            if was and was.is_idle:
                 self.executed.append(was)
-                mine.append(was)
                 self._note_asked(peer, pdu)
                 return was.answer
             before, answer = self.look(), execute(*given)
+            if was and answer != was.answer and pdu[:1] != READ_AND_WRITE:  # which may read what was refused last
+                self.broken.append(f"{asked} is answered {answer!r}, and was {was.answer!r}")
             if answer is not None:  # else it was not one whole frame
                 self._note_asked(peer, pdu)
             said = answer[7:] if execute.__name__ == "whole_answer" and answer else answer
             is_idle = answer is not None and self._is_right((unit, pdu, peer), said, before)
-            self.executed.append(Executed(answer, is_idle))
-            mine.append(self.executed[-1])
+            self.executed.append(Executed(asked, answer, is_idle))
             return answer
 
         return executed
+
+    def _was(self, asked: tuple[float, str, int | None, bytes]) -> Executed | None:
+        """What was executed in its place in the play before, which must be the same request; None in a first play."""
+        place, before = len(self.executed), self._first.executed if self._first else []
+        was = before[place] if place < len(before) else None
+        if self._first and (was is None or was.asked != asked):
+            self.broken.append(f"{asked} is asked, and was {was and was.asked}: the plays are not the same")
+        return was
 
     def _note_asked(self, peer: Peer, pdu: bytes) -> None:
         """Nobody who comes by an address asks more often than it may, on however many connections."""
@@ -146,7 +123,7 @@ class Judge:
     def _is_right(self, request: tuple[int | None, bytes, Peer], answer: bytes, before: Look) -> bool:
         """Judge one request; return whether nothing may come of it."""
         (unit, pdu, peer), after = request, self.look()
-        facts = Before(before.command, before.owner, before.word(101))
+        facts = self._facts(before)
         verdict = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits)
         if unit is not None and unit not in UNITS:
             verdict = Verdict(frozenset((11,)), is_write=verdict.is_write)
@@ -174,11 +151,16 @@ class Judge:
         is_plain = not peer.name and peer.host[0].isdecimal()
         return ROLES[peer.name] if peer.name in ROLES else self._world.plain_role if is_plain else int(peer.role)
 
+    def _facts(self, look: Look) -> Before:
+        return Before(look.command, look.owner, look.word(101), self._world.wired.controller.most_pull_n())
+
     def would_stop(self, pdu: bytes, peer: Peer) -> bool:
         """Decide whether a request would clear enable, by the rules."""
         now = self.look()
-        facts = Before(now.command, now.owner, now.word(101))
-        values = judge(pdu, self._role_of(peer), peer.identity, facts, self._world.known_bits).values or now.command
+        values = (
+            judge(pdu, self._role_of(peer), peer.identity, self._facts(now), self._world.known_bits).values
+            or now.command
+        )
         return bool(now.word(0) & 1) and not int(values[0]) & 1
 
     def _judge_reason(self, pdu: bytes, about: str) -> None:
@@ -198,8 +180,16 @@ class Judge:
             self.is_disturbed |= peer.host != KEEPER
         if self._role_of(peer) == 0:
             self.broken.append(f"a monitor writes: {about}")
-        if verdict.values is not None and verdict.codes == OK and verdict.values != after.command:
-            self.broken.append(f"is {after.command}, by the rules {verdict.values}: {about}")
+        values = verdict.values
+        if values is not None and verdict.codes == OK:
+            is_lost = (
+                before.word(FAULT_CODE) != MASTER_LOST == after.word(FAULT_CODE)
+            )  # control finds its lease over now
+            if after.command != (when_lost(values) if is_lost else values):
+                self.broken.append(f"is {after.command}, by the rules {values}: {about}")
+            if is_lost:
+                self.audit.note_accepted(peer, (before.command, values), verdict.written, (before.owner, before.owner))
+                return
         is_no_stop = verdict.written is None or verdict.written & ENABLE
         if before.word(101) == CALIBRATING != after.word(101) and is_no_stop:
             return  # a run has ended meanwhile, and took its setpoints and owner along
@@ -278,6 +268,8 @@ class Judge:
         self._writes.close()
         if self._first is None:
             self.broken += self.audit.broken()
+        elif len(self.executed) != len(self._first.executed):
+            self.broken.append(f"{len(self.executed)} are executed, and were {len(self._first.executed)}")
 
 
 def _request(name: str, given: tuple[Any, ...]) -> tuple[int | None, bytes, Peer]:

@@ -32,9 +32,12 @@ class Client:
         self._places = world.secure_places if certificate else world.places
         self._transaction = 65500 if certificate else 200
         self.connect()
+        self._places.onlookers.append(self.collect)
 
     def connect(self) -> None:
         """Connect anew; whoever finds no room is closed at once."""
+        self.is_closed = True
+        self._places.look()
         self.owed: deque[tuple[float, int, int, int]] = deque()
         self.heard, self.is_closed, self.reads = b"", False, True
         self._late_until_s, self._place = 0.0, None  # type: Place | None

@@ -5,30 +5,33 @@ held for a lost master) it leaves open: then one of several answers is right.
 """
 
 from dataclasses import dataclass, field
+from math import inf
 
 from tests.fuzz.bank_model import ENABLE, FACES, MOMENTARY, SHAPES, BankModel, Refused, Words, single
 
 SETPOINT, CALIBRATION = 1, 2
 """Roles, from monitor (0) to admin (3)."""
-RUNS, TAKE = 32 | 64, 8
+RUNS, TAKE, PULL = 32 | 64, 8, 16
 HEARTBEAT = 4
 CALIBRATING = 5
 WRITES = 5, 6, 15, 16, 22, 23
 OK, BY_STATE = frozenset((0,)), frozenset((0, 3, 4, 6))
 STAGING, STAGING_READ_ONLY = (1000, 1199), (1146, 1147, 1148)
 UNITS = 0, 1, 255
-PAYLOAD, MOST_PAYLOAD_G = 9, 10000
+FORCE, PAYLOAD, MOST_PAYLOAD_G = 1, 9, 10000
 VOLTAGE, MOST_MV = 5, 8500
 """As the rig has it: the range of its cell is 98.07 N."""
 
 
 @dataclass
 class Before:
-    """What registers and owner have told before the request. values: of the command block, in the registers' units."""
+    """What registers and owner have told before the request. values: of the command block, in the registers' units;
+    most_pull_n: as the model in use has it."""
 
     values: list[float]
     owner: str | None
     state: int
+    most_pull_n: float = inf
 
 
 @dataclass
@@ -50,6 +53,7 @@ class RunningReference(BankModel):
 
     role: int = 0
     state: int = 0
+    most_pull_n: float = inf
     written: int | None = None
     is_open: bool = field(default=False)
     is_remembered: bool = field(default=False)
@@ -80,13 +84,16 @@ class RunningReference(BankModel):
             raise Refused(3)
         word, before = int(changed[0]), int(self.values[0])
         self.written = word if 0 in covers else None
-        rises = word & ~before
+        rises, force_n = word & ~before, self.values[FORCE]
         if (word | before) & RUNS or self.state == CALIBRATING:
             self.is_open = True  # a run: only its end is granted to everybody
             return
         is_own = self.owner in (None, host) or bool(word & TAKE)
         super()._admit(changed, covers, host)
         self.is_open = is_own and bool(rises & ~MOMENTARY or word & MOMENTARY)
+        asked_n = self.values[FORCE] if int(self.values[0]) & PULL else 0.0
+        if not self.is_open and asked_n != force_n and asked_n > self.most_pull_n:
+            raise Refused(3)
 
 
 def judge(pdu: bytes, role: int, host: str, before: Before, known_bits: int) -> Verdict:
@@ -95,7 +102,12 @@ def judge(pdu: bytes, role: int, host: str, before: Before, known_bits: int) -> 
     if pdu[0] in (8, 17, 43):
         return Verdict(frozenset((_without_registers(pdu),)))
     reference = RunningReference(
-        list(before.values), before.owner, known_bits=known_bits, role=role, state=before.state
+        list(before.values),
+        before.owner,
+        known_bits=known_bits,
+        role=role,
+        state=before.state,
+        most_pull_n=before.most_pull_n,
     )
     code = reference.answer(pdu, host)
     if code is None:
@@ -106,6 +118,11 @@ def judge(pdu: bytes, role: int, host: str, before: Before, known_bits: int) -> 
     keeps_values = is_write and not (reference.is_open and (reference.written or 0) & (RUNS | TAKE | ENABLE))
     values = [single(value) for value in reference.values] if keeps_values and before.state != CALIBRATING else None
     return Verdict(codes, values, reference.written, is_write, reference.is_remembered)
+
+
+def when_lost(values: list[float]) -> list[float]:
+    """Return what the end of its lease leaves of an owner's command block."""
+    return [0.0 if k in (0, FORCE, VOLTAGE) else value for k, value in enumerate(values)]
 
 
 def is_whole(pdu: bytes) -> bool:

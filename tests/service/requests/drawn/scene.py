@@ -13,7 +13,8 @@ from gateway.profiles import Rig, load_rig
 from gateway.registers.words import State
 from tests.service.requests.drawn.bus import Bus
 from tests.service.requests.drawn.draws import READ_STATUS, STOPS, Upload, draw_request
-from tests.service.requests.drawn.judging import Judge, Look, differences
+from tests.service.requests.drawn.judging import Judge
+from tests.service.requests.drawn.looks import Look, differences
 from tests.service.requests.drawn.outsiders.browsers import Browsers
 from tests.service.requests.drawn.outsiders.callers import Callers
 from tests.service.requests.drawn.outsiders.places import Crowd

@@ -129,7 +129,9 @@ def draw_stranger(draw: Random) -> tuple[str, Any]:
     )
 
 
+@cache
 def _hello() -> bytes:
+    """One for all plays: what OpenSSL draws is of no seed."""
     incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
     tls = contexts()[1]["setpoint"].wrap_bio(incoming, outgoing, server_hostname="127.0.0.1")
     try:

@@ -37,6 +37,7 @@ from gateway.web.security import PageAccess
 from gateway.web.tabs import recordings, run_follower
 from tests.certificates import serial_of
 from tests.disk.at_once import AtOnce
+from tests.service.requests.drawn.clocks import patch_clocks
 from tests.service.requests.drawn.loop import SocketLoop
 from tests.service.requests.drawn.outsiders.places import Places, Rules
 from tests.service.requests.drawn.secure import SecureWire, contexts
@@ -171,8 +172,8 @@ class World(SocketLoop):
 
         for module in (page_server, recordings, run_follower):
             patch.setattr(module, "ask_once", ask_once)
-        patch.setattr(page_server, "Standstill", lambda: SimpleNamespace(is_aftermath=lambda: False))
         patch.setattr(page_server, "Commands", partial(Commands, clock=self.clock.time, sleep=self._sleep))
+        patch_clocks(patch, self.clock.time, self.stage.server.live)
 
     def _on_closed(self, peer: Peer) -> None:
         """As the faces of a running rig do."""

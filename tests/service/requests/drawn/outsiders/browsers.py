@@ -45,6 +45,17 @@ class Told(logging.Handler):
         self.sentences.append(f"{record.getMessage()} {record.exc_info[1] if record.exc_info else ''}")
 
 
+class InOrder(dict[Any, None]):
+    """For a set of the server's, in whose place the order is that of coming, and not of places in memory: of several who came
+    in one moment always the same one makes room."""
+
+    def add(self, one: Any) -> None:
+        self[one] = None
+
+    def discard(self, one: Any) -> None:
+        self.pop(one, None)
+
+
 class Browser:
     """One connection. methods: of the whole requests it has sent; reads: takes what is answered."""
 
@@ -68,6 +79,7 @@ class Browsers:
         )
         config.load()
         self._state, self._told = ServerState(), Told()
+        self._state.connections = InOrder()  # type: ignore[assignment]
         for name in LOGS:
             logging.getLogger(name).addHandler(self._told)
         self._serve = lambda: bounded_http.BoundedHttpProtocol(config, self._state, {})

@@ -39,9 +39,16 @@ class Places:
     def __init__(self, rules: Rules, now: Callable[[], float]) -> None:
         self.rules, self._now = rules, now
         self.broken: list[str] = []
+        self.onlookers: list[Callable[[], object]] = []
+        """Those who have places here, each to see which of its own were closed."""
         self._open: list[Place] = []
         self._left: deque[tuple[float, Place]] = deque(maxlen=64)
         self._came: list[tuple[str, float]] = []  # who has come where there was no room, and nobody has gone for yet
+
+    def look(self) -> None:
+        """Before somebody connects: where one was closed since anybody looked, there is room."""
+        for see in self.onlookers:
+            see()
 
     def take(self, host: str, is_admitted: bool) -> Place | None:
         """Somebody has connected, and is still there, or not."""
@@ -136,6 +143,7 @@ class Crowd:
         self._places, self._connect, self._now = places, connect, now
         self._ports = iter(range(20000, 40000))
         self.members: list[Member] = []
+        places.onlookers.append(self.look)
 
     def act(self, draw: Random, run: Callable[[float], None]) -> str:
         """Some come, from a few addresses; each says nothing, or a bit, or a whole request; some go, some send byte by byte."""
@@ -187,6 +195,7 @@ class Crowd:
 
     def _come(self, draw: Random) -> None:
         host = f"{CROWD}{draw.randrange(1, 6)}"
+        self._places.look()
         wire = self._connect(host, next(self._ports))
         if _is_open(wire):
             self._take(wire, host)
