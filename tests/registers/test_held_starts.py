@@ -2,6 +2,7 @@
 
 import pytest
 
+from gateway import defaults
 from gateway.registers.writes.held_starts import HeldEnables, StartFrame
 
 HOST, CHANNEL = "10.0.0.1", ("10.0.0.1", "10.0.0.1", 40000, 0, 12)
@@ -96,3 +97,16 @@ def test_the_next_process_is_told_of_a_held_enable_once_a_second_and_of_a_new_on
     held.note("10.0.0.2", 102.1)
     assert [list(one.values()) for one in told] == [[100.0], [pytest.approx(101.0)], [pytest.approx(102.0)],
                                                     [pytest.approx(102.0), 102.1]]  # fmt: skip
+
+
+def test_of_who_connects_anew_for_each_frame_the_latest_heartbeat_is_told() -> None:
+    """Its older ones, told again beside it, pushed it out."""
+    told = list[dict[str, list[int]]]()
+    held, last = HeldEnables(), 3 * defaults.MOST_FRAMES
+    held.on_lost, held.beats_of = told.append, lambda host: range(1000, 1000 + defaults.MOST_FRAMES)
+    for beat in range(1, last + 1):
+        held.frames.note((HOST, HOST, 40000 + beat, 0, 12), beat)
+        for _ in range(3):
+            held.note_lost(HOST, beat)
+            assert beat in told[-1][HOST] and len(told[-1][HOST]) == defaults.MOST_FRAMES
+    assert len(told) == last, "once for each"
