@@ -16,7 +16,7 @@ DEFECTS = (
            "[*lost.get(owner, ()), *left_beats]", "[*left_beats]",
            ("service/running_rig/masters/test_behind_a_death.py",)),
     Defect("of many connections' heartbeats the next process is told old ones", "registers/writes/held_starts.py",
-           "(*reversed(beats), *reversed(known))", "(*beats, *reversed(known))",
+           "(*reversed(beats), *reversed(known))", "(*reversed(known), *reversed(beats))",
            ("registers/test_held_starts.py",)),
     Defect("a zero of enable beside the bit of a run lets that go", "registers/writes/held_starts.py",
            "        if asks:\n            return\n", "",
