@@ -311,8 +311,8 @@ class RegisterBank:
         return self._writers.by_name()
 
     def _settle_owner(self, admitted: AdmittedWrite, host: str, peer: Peer) -> None:
-        ownership = self._ownership
-        asks = admitted.asks(ownership.owner)
+        ownership, values = self._ownership, admitted.values
+        asks = bool(admitted.kept or values[FORCE_SETPOINT] or values[VOLTAGE_SETPOINT]) and not admitted.stands
         if ownership.owner != (host if asks else None) or admitted.is_stop or admitted.is_taken_over:
             ownership.settle(host, takes_over=admitted.is_taken_over, stops=admitted.is_stop, asks=asks)
         elif not asks or peer is self._owner_peer:

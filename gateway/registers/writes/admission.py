@@ -96,20 +96,20 @@ class Admission:
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
         command = commands.command(values, written, number, now_s, self._sender(write, is_guest=is_guest))
-        if is_stop:
-            command = command._replace(stops=True)
-        elif self.lowered_from_n and FORCE_SETPOINT not in self._offsets(write) and not is_begun_anew:
-            command = command._replace(lowered_from_n=self.lowered_from_n)
+        is_anew = is_stop or is_begun_anew or FORCE_SETPOINT in self._offsets(write)
         frame = self._frame(write, int(values[HEARTBEAT]), written)
         repeats = not self._is_in_use(write.host) and self.held_enables.repeats(write.host, frame, now_s)
-        command = command._replace(has_waited=write.peer.is_behind, repeats=repeats)
+        lowered_n, waits = 0.0 if is_anew else self.lowered_from_n, write.peer.is_behind
+        command = command._replace(stops=is_stop, lowered_from_n=lowered_n, has_waited=waits, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)
         self._check_tare(command, word_at, frame)
         self._check_starts(command, word_at)
         self._hear(write, asked, heartbeat, now_s)
         edges_kept = 0 if is_stop else written & ~EDGE_BITS
-        return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, self._held_by(write, written, asked))
+        held = self._held_by(write, written, asked)
+        stands = bool(repeats and edges_kept and self._ownership.owner is None)
+        return AdmittedWrite(values, edges_kept, command, is_stop, is_taken_over, held, stands=stands)
 
     def note_state(self, state: State, tell: Callable[[], Status]) -> None:
         """Note the state of control, and who tells the rest: what may be asked for, and left behind, depends on it."""

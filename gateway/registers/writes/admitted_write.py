@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 from gateway.modbus import Peer
 from gateway.registers.command import Command
 from gateway.registers.map.register_map import Block
-from gateway.registers.writes.command_block import FORCE_SETPOINT, VOLTAGE_SETPOINT, Values
+from gateway.registers.writes.command_block import Values
 
 ALL_BITS: Final = 0xFFFF
 
@@ -25,7 +25,8 @@ class Write(NamedTuple):
 class AdmittedWrite(NamedTuple):
     """values: to store; kept: control word that reads back; command: what control gets, edge bits included; is_stop: the
     output goes off; is_taken_over: this host owns from now on, explicitly; held: bits of runs that this host keeps at 1;
-    is_plain: no bit rises or falls."""
+    is_plain: no bit rises or falls; stands: it is of a program that stands still, and makes nobody the owner of what is
+    out for a lost master."""
 
     values: Values
     kept: int
@@ -34,13 +35,7 @@ class AdmittedWrite(NamedTuple):
     is_taken_over: bool
     held: int
     is_plain: bool = False
-
-    def asks(self, owner: str | None) -> bool:
-        """Decide whether who wrote this owns from now on, owner not standing against it: it leaves a bit or a setpoint. A frame
-        of a program that stands still is not the owner of what is out for a lost master."""
-        if self.command.repeats and owner is None and self.kept:
-            return False
-        return bool(self.kept or self.values[FORCE_SETPOINT] or self.values[VOLTAGE_SETPOINT])
+    stands: bool = False
 
 
 OnWrite = Callable[[Peer, Values, AdmittedWrite, tuple[str | None, str | None]], None]
