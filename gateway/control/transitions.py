@@ -197,6 +197,8 @@ class Transitions:
         self.tell(fault_sentence(FaultCode.MASTER_LOST, f"{observation}, {words}"))
 
     def _latch(self, now_s: float, fault: FaultCode) -> None:
+        """Behind it a program that has hung meanwhile must not begin by the heartbeat of before, when somebody else resets."""
+        self.parts.commands.let_no_beat_count()
         self.fire(StateEvent.FAILED)
         self.fault, self.faulted_s = fault, now_s
 

@@ -10,7 +10,7 @@ from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, b
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
 from tests.service.running_rig.simulated_rig import ENABLE, OTHER, TARE
 
-SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047
+SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074
 
 
 @pytest.mark.parametrize("first", SEEDS)
