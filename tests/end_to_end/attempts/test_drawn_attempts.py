@@ -59,10 +59,10 @@ def be_rough(scene: Attempted, lasts_s: float) -> None:
 
 
 def test_a_held_force_stays_beside_what_is_harmless(tmp_path: Path) -> None:
-    """Real time: three seconds of it."""
+    """Real time: a second of it."""
     with attempted(tmp_path, Random(0)) as scene:
         take_up(scene, _BACK_S)
-        hold_beside(scene, 3.0)
+        hold_beside(scene, 1.0)
     assert not scene.faults
 
 
