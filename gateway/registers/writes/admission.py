@@ -96,10 +96,10 @@ class Admission:
         if is_begun_anew:
             values = without_left_setpoints(commands, values, self._offsets(write), self._tell())
         command = commands.command(values, written, number, now_s, self._sender(write, is_guest=is_guest))
-        is_anew = is_stop or is_begun_anew or FORCE_SETPOINT in self._offsets(write)
+        is_said_anew = is_stop or is_begun_anew or FORCE_SETPOINT in self._offsets(write)
         frame = self._frame(write, int(values[HEARTBEAT]), written)
         repeats = not self._is_in_use(write.host) and self.held_enables.repeats(write.host, frame, now_s)
-        lowered_n, waits = 0.0 if is_anew else self.lowered_from_n, write.peer.is_behind
+        lowered_n, waits = 0.0 if is_said_anew else self.lowered_from_n, write.peer.is_behind
         command = command._replace(stops=is_stop, lowered_from_n=lowered_n, has_waited=waits, repeats=repeats)
         self._ask(command, permitted.values, write)
         word_at = commands.address(write.block, CONTROL_WORD)

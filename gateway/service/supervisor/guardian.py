@@ -46,9 +46,7 @@ _REFUSED: Final = frozenset({exit_codes.DATA, exit_codes.PERMISSION, exit_codes.
 def run(options: RunOptions) -> int:
     """Run one rig until it is told to stop; the process's exit code."""
     state = options.state_directory
-    with contextlib.suppress(
-        OSError
-    ):  # a disk that syncs no name is no reason not to control; one that makes none is told next
+    with contextlib.suppress(OSError):  # a disk that syncs no name is no reason not to control
         make_path(state)
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
     with hold_state_lock(state) as is_ours:

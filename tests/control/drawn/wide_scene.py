@@ -6,7 +6,7 @@ from gateway.control import Output
 from gateway.registers.words import ControlBit, Mode, State, StatusBit
 from tests.control.bench import Record, bsfm
 from tests.control.drawn.judge import TOLD, Judge
-from tests.control.drawn.scene import BUMP_V, Scene
+from tests.control.drawn.scene import BUMP_V, Scene, WatchedRig
 from tests.control.drawn.valve_laws import ValveLaws
 from tests.control.drawn.wide_rig import WideRig
 
@@ -93,7 +93,7 @@ class WideJudge(Judge):
             self.complain(f"{self.swings} swings about {command.force_setpoint_n} N, and nothing told")
 
 
-class WatchedWideRig(WideRig):
+class WatchedWideRig(WatchedRig, WideRig):
     """Shows each step, and each move of its relay, to its judge."""
 
     judge: WideJudge | None = None
@@ -101,12 +101,7 @@ class WatchedWideRig(WideRig):
     def step(self) -> Output:
         if self.settings.valve and self.move_relay() and self.judge:
             self.judge.valve.moved()
-        output = super().step()
-        if self.judge:
-            self.judge.look(self.history[-1])
-            if len(self.history) > 50:
-                del self.history[:-2]
-        return output
+        return super().step()
 
 
 class WideScene(Scene):

@@ -6,6 +6,7 @@ What is done is the seed's; when, is the machine's. `ATTEMPTS=40:60 ./tools/test
 
 import os
 import time
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
@@ -24,14 +25,22 @@ _BACK_S = 10.0
 time before it is started."""
 _ANSWER_S = 1.0
 
+Act = Callable[[Attempted], None]
 
-def hold_beside(scene: Attempted, lasts_s: float) -> None:
-    """A held force, and everything harmless beside it."""
+
+def drawn_for(scene: Attempted, lasts_s: float) -> Iterator[Act]:
+    """Harmless acts by chance, for so long."""
+    until_s = time.monotonic() + lasts_s
+    while time.monotonic() < until_s:
+        yield scene.draw.choice(harmless.ACTS)
+
+
+def hold_beside(scene: Attempted, acts: Iterable[Act]) -> None:
+    """A held force, these acts beside it, and people's verbs all the while."""
     began_s = time.monotonic()
     with ThreadPoolExecutor(1) as people:
         asked = people.submit(scene.verb, *harmless.choose_verb(scene))
-        while time.monotonic() < began_s + lasts_s:
-            act = scene.draw.choice(harmless.ACTS)
+        for act in acts:
             scene.say(act.__name__)
             act(scene)
             if asked.done():
@@ -59,10 +68,10 @@ def be_rough(scene: Attempted, lasts_s: float) -> None:
 
 
 def test_a_held_force_stays_beside_what_is_harmless(tmp_path: Path) -> None:
-    """Real time: a second of it."""
+    """Real time, two or three seconds: each act once, and refused writes at several places."""
     with attempted(tmp_path, Random(0)) as scene:
         take_up(scene, _BACK_S)
-        hold_beside(scene, 1.0)
+        hold_beside(scene, (*dict.fromkeys(harmless.ACTS), *[harmless.write_refused] * 10))
     assert not scene.faults
 
 
@@ -73,7 +82,7 @@ def test_the_force_is_back_after_anything(tmp_path: Path, seed: int) -> None:
     with attempted(tmp_path, Random(seed)) as scene:
         for _ in range(_ROUNDS):
             take_up(scene, _BACK_S)
-            hold_beside(scene, _HARMLESS_S)
+            hold_beside(scene, drawn_for(scene, _HARMLESS_S))
             be_rough(scene, _ROUGH_S)
         took_s = take_up(scene, _BACK_S)
     print(f"seed {seed}: {len(scene.said)} things done, {len(scene.looks)} looks, in band again within {took_s:.1f} s")
