@@ -30,6 +30,11 @@ def shipped_profiles_folder() -> Path:
     return installed if installed.is_dir() else package.parent / "profiles"
 
 
+def shipped_file(kind: str, name: str) -> Path:
+    """Return where the shipped profile of this name is, whether or not it is there."""
+    return shipped_profiles_folder() / FOLDERS[kind] / f"{name}.yaml"
+
+
 def list_shipped(kind: str) -> list[str]:
     """Return names of the shipped profiles of a kind (rig, device, plant, calibration, registers, plan)."""
     return sorted(path.stem for path in (shipped_profiles_folder() / FOLDERS[kind]).glob("*.yaml"))
@@ -46,7 +51,7 @@ def locate(kind: str, name: str, beside: Path | None = None, *, of_any_kind: boo
         raise FileNotFoundError("an empty name, as of a variable that is not set")
     known = list_shipped(kind)
     if name in known:
-        return shipped_profiles_folder() / FOLDERS[kind] / f"{name}.yaml"
+        return shipped_file(kind, name)
     folder = beside or Path()
     path = folder / expand_home(name)
     for candidate in (path, folder / f"{name}.yaml", folder / FOLDERS[kind] / f"{name}.yaml"):

@@ -106,6 +106,18 @@ def test_a_map_of_one_s_own_is_tried_by_its_own_numbers(tmp_path: Path) -> None:
     assert Path(words[words.index("--rig") + 1]) == tmp_path / "own rig.yaml"
 
 
+def test_the_lines_to_try_are_told_while_the_shipped_profiles_are_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As while another version is being installed: a control process that was started again then must not end by its words."""
+    rig, away = demo(), Path("/nowhere/profiles")
+    told = try_lines(rig, "127.0.0.1", 5020)
+    monkeypatch.setattr("gateway.profiles.find.shipped_profiles_folder", lambda: away)
+    while_away = try_lines(rig, "127.0.0.1", 5020)
+    assert [line.partition(" --map ")[0] for line in while_away[1:]] == [
+        line.partition("        ")[0] for line in told[1:]
+    ]
+    assert while_away[0] == told[0]
+
+
 def test_a_valve_and_what_listens_for_http_are_told_where_they_are() -> None:
     pulls, http = load_rig("paper-pull", simulated=True), {"web": ("127.0.0.1", 8080), "metrics": ("::", 9090)}
     given = ready(rig=pulls, valve_port="/dev/pts/9", http=http)

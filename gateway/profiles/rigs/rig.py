@@ -17,7 +17,7 @@ from gateway.control.inputs import CalibrationInUse
 from gateway.control.settings import ControlSettings
 from gateway.devices import DeviceProfile, SerialSettings
 from gateway.extras import is_installed, missing_note
-from gateway.profiles.find import display, locate
+from gateway.profiles.find import display, shipped_file
 from gateway.profiles.http_sections import Metrics, OpcUa, Web
 from gateway.profiles.kinds.plants import PlantProfile
 from gateway.profiles.recordings_section import Retention
@@ -55,8 +55,9 @@ def is_own(calibration: Calibration, rig: str, simulated_plant: PlantProfile | N
 
 
 def map_option(register_map: RegisterMap) -> str:
-    """Return the option that names this map to our own verbs; empty for the one that they take without it."""
-    file, shipped = register_map.file, display(locate("registers", defaults.REGISTER_MAP))
+    """Return the option that names this map to our own verbs; empty for the one that they take without it. No disk is asked: a
+    process that is started again while another version is being installed tells it as well."""
+    file, shipped = register_map.file, display(shipped_file("registers", defaults.REGISTER_MAP))
     return "" if file in ("", shipped) else f" --map {quote(file)}"
 
 
