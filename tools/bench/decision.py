@@ -10,6 +10,7 @@ peer is the same way once it has just run.
 """
 
 import argparse
+import struct
 import sys
 import time
 from collections.abc import Callable
@@ -22,11 +23,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from gateway.cli.diagnosis.progress_line import show_progress
 from gateway.progress import report
-from tests.service.wired import ENABLE, Wired
+from tests.service.wired import ENABLE, MASTER, Wired
 
 GOAL_S = 60e-6
 CACHES = np.zeros(64 << 20, dtype=np.uint8)
 VOLTAGE_MODE, LOW_MV, HIGH_MV = 1, 2000, 3000
+WORDS = struct.Struct(">6H")
 FREE_LINE_S = 0.12
 """Of simulated time: the last setting has been answered, and no poll is out."""
 WAIT_S = 0.01
@@ -59,18 +61,18 @@ class Decisions:
         self._handed_s: list[float] = []
         self._write, self._wired.exchange._write = self._wired.exchange._write, self._hand_over
         self._voltage_mv = LOW_MV
-        self._command(LOW_MV)
+        self._set(LOW_MV)
 
     def _hand_over(self, data: bytes) -> None:
         self._handed_s.append(time.perf_counter())
         self._write(data)
 
-    def _command(self, voltage_mv: int) -> None:
-        self._wired.write(0, ENABLE, 0, 0, VOLTAGE_MODE, 0, voltage_mv)
+    def _set(self, voltage_mv: int) -> None:
+        self._wired.bank.write_registers(0, WORDS.pack(ENABLE, 0, 0, VOLTAGE_MODE, 0, voltage_mv), MASTER)
 
     def _set_other_voltage(self) -> None:
         self._voltage_mv = LOW_MV + HIGH_MV - self._voltage_mv
-        self._command(self._voltage_mv)
+        self._set(self._voltage_mv)
 
     def measure_setpoint(self, before: Callable[[], None]) -> float | None:
         """Return the seconds from a write to the port; None where a poll was just out."""
