@@ -69,6 +69,8 @@ class CommandTracker:
         word = int(command.control_word)
         if command.number == self.command.number:
             word &= ~_MOMENTARY  # the bank's own change of a command that has acted
+        if word == self._word and not command.stops:
+            return NO_EDGES  # most writes are so
         rises, falls = word & ~self._word, self._word & ~word
         return Edges(rises, falls, command.stops or bool(falls & _ENABLE and not rises & RUN_BITS))
 

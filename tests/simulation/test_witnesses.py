@@ -137,6 +137,19 @@ def test_who_takes_over_asks_for_what_is_pursued(
     assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken
 
 
+@pytest.mark.parametrize(("accepted", "is_broken"), [(3902, False), (3901, True)])
+def test_what_is_pursued_may_have_become_less_since_the_look_before(
+    observer: Observer, accepted: int, is_broken: bool
+) -> None:
+    """As seed 250205 drew it: the owner's lease ended on the way to 44.92 N, and another one's heartbeat took over at once."""
+    witness = StatusWitness(observer, lambda: inf)
+    witness.note_write(OWNER, write_one_pdu(1, 4492), 1.85)
+    look(witness, 1.9, requested=4492, accepted=4492, owner=1)
+    for number in range(1, 5):
+        look(witness, 1.9 + 0.1 * number, requested=3902, accepted=accepted, owner=2)
+    assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken
+
+
 def test_a_gateway_that_begins_has_no_owner(observer: Observer) -> None:
     """As seed 23090 drew it: between two looks it began, another one enabled and was lost, and the first one owned it again."""
     witness = StatusWitness(observer, lambda: inf)

@@ -132,14 +132,14 @@ class StatusWitness:
     def _judge_requested(self) -> None:
         """A look of some time ago: who hears no answer tells so late. What was written since the look before it, which a
         standstill may have made long, may be seen now for the first time. Who takes over has asked for what is pursued: less
-        than was written, where a calibration has lowered it or a lost master's is held."""
+        than was written, where a calibration has lowered it or a lost master's is held, even since the look before."""
         at_s, counts, accepted, owner = self._requested.popleft()
         while self._written and self._written[0][0] < min(at_s, self._requested_s) - WRITTEN_S:
             self._written.popleft()
         self._requested_s = at_s
         signed = counts - 65536 if counts & UNAVAILABLE else counts
         left, former = self._left
-        is_known = counts in (0, self._known) or (owner != former and counts == left)
+        is_known = counts in (0, self._known) or (owner != former and counts in (left, accepted))
         if not is_known and all(abs(signed - one) > 1.0 for _, one in self._written):
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
         self._known, self._left = counts, (accepted, owner)

@@ -115,4 +115,18 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(11.9479, "integrator", "upload"),
         ],
     ),
+    (
+        250205,
+        [
+            Event(2.8414, "rival", "take", (44.92,)),
+            Event(4.1295, "worker", "hold", (10.27,), way="coils"),
+            Event(
+                5.6293,
+                "person",
+                "say",
+                data=b'{"do": "modbus", "via": "opcua", "pdu": "10000000020400000000", "unit": 1}',
+            ),
+            Event(5.8288, "rival", "pull", (2.74,)),
+        ],
+    ),
 ]
