@@ -275,9 +275,8 @@ class HeldEnables:
             self._find(host)
 
     def let_go(self, host: str, now_s: float, *, asks: bool = False) -> None:
-        """Note that a host has written enable as 0; asks: beside the bit of a run or a tare, which goes on asking. What was
-        refused, and comes again as soon as only a cycle does, is of a program beside the one that wrote this: it is missed in
-        the next process, too."""
+        """Note that a host has written enable as 0; asks: beside the bit of a run or a tare, which goes on asking. Who was
+        lost stays so for the next process: this 0 may be of a program beside the one that hung."""
         self._forget(host)
         if asks:
             return
@@ -285,8 +284,6 @@ class HeldEnables:
             self._let_go_s[host] = now_s
         if refused := self._refused.get((host, False)):
             self._refused[host, False] = refused._replace(is_let_go=True)
-        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
-            self._miss_no_more(host)
 
     def let_go_tare(self, host: str) -> None:
         """Note that a host has written the bit of a tare as 0."""
@@ -316,6 +313,7 @@ class HeldEnables:
 
 
 def _sent_alike(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
-    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came."""
-    alike = [channel for channel, other in sent.items() if other.data == frame.data]
+    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came. Tares
+    of two programs are the same bytes, too, and each of them goes on: there a connection stands for its program."""
+    alike = [channel for channel, other in sent.items() if other.data == frame.data and not frame.tares]
     return {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}

@@ -1,5 +1,7 @@
 """Wider scenes: serial faces, certificates, more spellings, other leases, standstills."""
 
+from typing import Any
+
 import pytest
 
 from gateway.codes.refusals import RefusalReason
@@ -8,7 +10,7 @@ from gateway.registers.words import State
 from tests.service.running_rig.masters.drawn.laws import LEASE_S
 from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, TARE
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, TARE
 
 SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074
 
@@ -107,3 +109,29 @@ def test_a_tare_with_the_heartbeat_of_the_last_one_is_refused_however_late_it_co
     assert rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER) is None
     refused = rig.run(5.0).answer(0, TARE, 0, 0, 0, 7, peer=OTHER)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+@pytest.mark.parametrize("is_beside_another", [False, True])
+def test_behind_a_death_no_run_begins_again_of_a_program_that_hung_and_whose_run_another_one_had_ended(
+    is_beside_another: bool,
+) -> None:
+    """No enable had fallen, so that no stop was seen; and the 0 of a program beside it, which hung too, was its own."""
+    kept = dict[str, Any]()
+    rig, other = begun(kept), Peer(OTHER.host, OTHER.port + 1)
+    rig.write(0, 0, 0, 0, 0, 9, peer=other)
+    rig.write(1, 0, 0, 0, 7, peer=OTHER)
+    rig.write(0, CALIBRATE, peer=OTHER)
+    assert rig.state is State.CALIBRATING
+    rig.bank.mask_write(0, 0xFFFF & ~(ENABLE | CALIBRATE), 0, Peer("web"))
+    assert rig.run(0.1).state is State.OFF
+    for _ in range(2):
+        if is_beside_another:
+            rig.answer(0, 0, 0, 0, 0, 9, peer=other)
+        rig = begun(kept)
+        for _ in range(5):
+            rig.write(1, 0, 0, 0, 7, peer=OTHER)
+            refused = rig.answer(0, CALIBRATE, peer=OTHER)
+            assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+            rig.run(0.2)
+    rig.write(1, 0, 0, 0, 8, peer=OTHER)
+    assert rig.answer(0, CALIBRATE, peer=OTHER) is None, "its program goes on"
