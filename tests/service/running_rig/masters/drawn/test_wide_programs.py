@@ -12,7 +12,7 @@ from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, b
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
 from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, TARE
 
-SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074
+SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074, 66800
 
 
 @pytest.mark.parametrize("first", SEEDS)
@@ -135,3 +135,18 @@ def test_behind_a_death_no_run_begins_again_of_a_program_that_hung_and_whose_run
             rig.run(0.2)
     rig.write(1, 0, 0, 0, 8, peer=OTHER)
     assert rig.answer(0, CALIBRATE, peer=OTHER) is None, "its program goes on"
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_what_hung_begins_nothing_for_the_silence_of_a_gateway_that_stood_still(waits: bool) -> None:
+    """Three seconds in which its frames were not heard were three in which it had not sent any."""
+    rig = begun()
+    rig.is_cell_silent = True
+    assert rig.run(0.5).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    rig.is_cell_silent = False
+    rig.run(0.2).ticks += 310
+    if waits:
+        rig.answer(4, 7, peer=OTHER)
+    refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.run(3.1).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER) is None, "who is silent for so long decides anew"
