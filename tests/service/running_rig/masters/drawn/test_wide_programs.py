@@ -150,3 +150,14 @@ def test_what_hung_begins_nothing_for_the_silence_of_a_gateway_that_stood_still(
     refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     assert rig.run(3.1).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER) is None, "who is silent for so long decides anew"
+
+
+def test_behind_a_standstill_a_program_that_hung_does_not_undo_the_0_of_another_one_on_its_host() -> None:
+    """Within 0.8 s of that 0 its next frame would have come, and been refused: nobody was there to hear it."""
+    rig = begun()
+    for beat in (6, 7):
+        rig.run(0.05).write(0, ENABLE, 1200, 0, 0, beat, peer=OTHER)
+    rig.run(0.2).write(0, 0, peer=Peer(OTHER.host, OTHER.port + 1))
+    rig.run(0.2).ticks += 100
+    refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE and rig.state is State.OFF
