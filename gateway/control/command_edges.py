@@ -77,6 +77,8 @@ class CommandTracker:
     def take(self, now_s: float, command: Command) -> Edges:
         """Take this as the command from now on; none of its edges act twice. Ask at each step: a payload follows in time."""
         dt_s, self._taken_s = now_s - self._taken_s, now_s
+        if dt_s > self._settings.supervision.stall_s:
+            self._lease.stand_still(now_s)
         if command is self.command:
             if self._payload_kg != self._wanted_kg:
                 self._follow_payload(dt_s)

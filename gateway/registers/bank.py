@@ -289,7 +289,7 @@ class RegisterBank:
             return
         before, owner = self._commands.values, self._ownership.owner
         self._commands.store(admitted.values, admitted.kept)
-        self._admission.note_stored(admitted)
+        self._admission.note_stored(admitted, before)
         self._settle_owner(admitted, write.host, peer)
         owners = owner, self._ownership.owner  # by this write; what control does in it is not its master's
         names = self._commands.names(write.block, write.address, len(write.data) // 2)

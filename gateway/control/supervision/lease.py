@@ -86,6 +86,10 @@ class Lease:
                 self._beats[other] = heartbeat, nan
         keep_latest(self._stopped_s, who, now_s)
 
+    def stand_still(self, now_s: float) -> None:
+        """Let each stop be one of now, behind a stall of the loop: the frame that follows it has not been heard yet."""
+        self._stopped_s = dict.fromkeys(self._stopped_s, now_s)
+
     def let_no_beat_count(self) -> None:
         """Let no beat of before count, whose ever: the output goes off, and nobody has asked for that just now."""
         self._beats = {who: (heartbeat, nan) for who, (heartbeat, _) in self._beats.items()}

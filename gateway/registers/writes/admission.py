@@ -115,10 +115,11 @@ class Admission:
         """Note the state of control, and who tells the rest: what may be asked for, and left behind, depends on it."""
         self.is_calibrating, self._tell = state is State.CALIBRATING, tell
 
-    def note_stored(self, admitted: AdmittedWrite) -> None:
-        """Remember what a write that was stored has held and lowered, and whom it has stopped."""
-        if admitted.is_stop and not self._ownership.admits(admitted.command.peer):
-            self.held_enables.note_lost(self._ownership.owner, admitted.command.heartbeat)
+    def note_stored(self, admitted: AdmittedWrite, before: Values) -> None:
+        """Remember what a write that was stored has held and lowered, and whom it has stopped, in a run, too, or has taken over
+        from: the last frame of that one may flow on into the next process. before: values that stood."""
+        if not self._ownership.admits(admitted.command.peer):
+            self.held_enables.note_lost(self._ownership.owner, int(before[HEARTBEAT]))
         if admitted.held or self.held_runs.by_host:
             self.held_runs.keep(admitted.command.peer, admitted.held)
         self.lowered_from_n = admitted.command.lowered_from_n
@@ -233,8 +234,6 @@ class Admission:
             self.held_enables.note_refused(write.host, frame._replace(tares=True), standing, now_s)
 
     def _hear(self, write: Write, asked: int, heartbeat: int, now_s: float) -> None:
-        if asked & TAKE and self._ownership.owner != write.host:  # whose last frame may flow on into the next process
-            self.held_enables.note_lost(self._ownership.owner, int(self._commands.values[HEARTBEAT]))
         offsets, enables = self._offsets(write), self.held_enables
         zeros = write.touched & ~asked if CONTROL_WORD in offsets else 0
         is_known = enables.knows(write.host)

@@ -96,7 +96,8 @@ class HeldEnables:
     """by_host: when each host that keeps enable at 1 over a latched fault has written it last, monotonic s; on_change: told of
     all of them, of other times of the same ones once a second. has_lease: a heartbeat has to change; else none is noted. lost:
     the heartbeats with which each master was lost in the process before, one for each of its frames; on_lost: told of all of
-    this one's; beats_of: what a host's frames bring, as far as control has taken them."""
+    this one's; beats_of: what a host's frames bring, as far as control has taken them; awake_since_s: since when this process
+    has come by without a stall, s."""
 
     def __init__(self, *, has_lease: bool = True) -> None:
         self._has_lease = has_lease
@@ -104,6 +105,7 @@ class HeldEnables:
         self.on_lost: Callable[[dict[str, list[int]]], None] = lambda lost: None
         self.beats_of: Callable[[str | None], Sequence[int]] = lambda host: ()
         self.on_refused_beat: Callable[[float, int, str, Channel], None] = lambda now_s, heartbeat, host, channel: None
+        self.awake_since_s: Callable[[], float] = lambda: -inf
         self.by_host: dict[str, float] = {}
         self.lost: dict[str, list[int]] = {}
         self._lost_now: dict[str, list[int]] = {}
@@ -217,14 +219,14 @@ class HeldEnables:
         was refused last: by the frame of a program that hung meanwhile, the machine would press when what it was refused for
         is over."""
         if host in self.lost and (frame.heartbeat is None or not self._is_there(host, frame.heartbeat, frame.channel)):
-            if now_s - self._let_go_s.get(host, inf) < LONGEST_CYCLE_S:
+            if self._silent_s(self._let_go_s.get(host, inf), now_s) < LONGEST_CYCLE_S:
                 return True
             self._find(host)
         key = host, frame.tares
         if (refused := self._refused.get(key)) is None or not self._is_same(host, refused, frame):
             return False
         is_by_hand = refused.is_let_go or (frame.tares and frame.heartbeat is None)
-        if now_s - refused.at_s >= (LONGEST_CYCLE_S if is_by_hand else inf if frame.tares else _HELD_S):
+        if self._silent_s(refused.at_s, now_s) >= (LONGEST_CYCLE_S if is_by_hand else inf if frame.tares else _HELD_S):
             del self._refused[key]
             self._miss_no_more(host)
             return False
@@ -233,6 +235,10 @@ class HeldEnables:
         sent = _sent_alike(refused.sent, frame, self.frames.moves_so_far)
         self._refused[key] = refused._replace(at_s=now_s, sent=sent)
         return True
+
+    def _silent_s(self, since_s: float, now_s: float) -> float:
+        """Return for how long nothing has come since then, s: what nobody was there to hear is no silence."""
+        return now_s - max(since_s, self.awake_since_s())
 
     def knows(self, host: str) -> bool:
         """Decide whether this host keeps up an enable, or was lost or refused and has not been heard since."""
@@ -245,7 +251,7 @@ class HeldEnables:
 
     def holds(self, host: str, now_s: float) -> bool:
         """Decide whether a 1 of this host is one that it has kept up since the fault. If so, it goes on being kept up."""
-        if now_s - self.by_host.get(host, -_HELD_S) >= _HELD_S:
+        if (held_s := self.by_host.get(host)) is None or self._silent_s(held_s, now_s) >= _HELD_S:
             self._forget(host)
             return False
         self.note(host, now_s)
@@ -275,9 +281,8 @@ class HeldEnables:
             self._find(host)
 
     def let_go(self, host: str, now_s: float, *, asks: bool = False) -> None:
-        """Note that a host has written enable as 0; asks: beside the bit of a run or a tare, which goes on asking. What was
-        refused, and comes again as soon as only a cycle does, is of a program beside the one that wrote this: it is missed in
-        the next process, too."""
+        """Note that a host has written enable as 0; asks: beside the bit of a run or a tare, which goes on asking. Who was
+        lost stays so for the next process: this 0 may be of a program beside the one that hung."""
         self._forget(host)
         if asks:
             return
@@ -285,8 +290,6 @@ class HeldEnables:
             self._let_go_s[host] = now_s
         if refused := self._refused.get((host, False)):
             self._refused[host, False] = refused._replace(is_let_go=True)
-        if refused is None or now_s - refused.at_s >= LONGEST_CYCLE_S:
-            self._miss_no_more(host)
 
     def let_go_tare(self, host: str) -> None:
         """Note that a host has written the bit of a tare as 0."""
@@ -316,6 +319,7 @@ class HeldEnables:
 
 
 def _sent_alike(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
-    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came."""
-    alike = [channel for channel, other in sent.items() if other.data == frame.data]
+    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came. Tares
+    of two programs are the same bytes, too, and each of them goes on: there a connection stands for its program."""
+    alike = [channel for channel, other in sent.items() if other.data == frame.data and not frame.tares]
     return {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}

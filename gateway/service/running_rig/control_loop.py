@@ -94,8 +94,7 @@ class ControlLoop:
         self.clock, self._log = process.clock, process.log
         self.processor_time, self._lateness = process.processor_time, process.lateness
         self.last_tick = LastTick(process.suspended_s)
-        self._heard_s = -inf
-        self._fresh_s = _FRESH_PERIODS * process.period_s
+        self._heard_s, self._fresh_s = -inf, _FRESH_PERIODS * process.period_s
         self.warnings = RateWarnings(
             SlowLoop(process.period_s, process.lateness.withheld if process.lateness else None),
             LineNoise("load cell's", cell.unread.explain),
@@ -105,6 +104,7 @@ class ControlLoop:
         if lateness := process.lateness:
             self.warnings.held = lambda then_s, now_s: lateness.since(then_s, now_s, waited_s_of(self.processor_time()))
         bank.held_enables.beats_of, bank.held_enables.on_refused_beat = controller.beats_of, controller.hear_refused
+        bank.held_enables.awake_since_s = lambda: self.last_tick.awake_since_s(self.clock())
         bank.on_command, bank.on_asked = self._on_command, self._on_asked
 
     def _on_asked(self, proposal: ProposedWrite) -> EdgeRefusal | None:

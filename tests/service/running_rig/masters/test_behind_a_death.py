@@ -61,10 +61,10 @@ def test_behind_a_crash_the_frames_of_a_hung_program_press_not_whichever_comes_f
 
 @pytest.mark.parametrize(
     ("writes", "is_found"),
-    [((0, ENABLE, 1200, 0, 0, 7), False), ((4, 7), False), ((1, 0), False), ((0, 0), True), ((4, 8), True)],
+    [((0, ENABLE, 1200, 0, 0, 7), False), ((4, 7), False), ((1, 0), False), ((0, 0), False), ((4, 8), True)],
 )
 @pytest.mark.parametrize("behind_a_crash", [False, True])
-def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
+def test_a_lost_master_is_there_again_with_another_heartbeat_or_there_with_its_own_0_and_a_cycle(
     writes: tuple[int, ...], is_found: bool, behind_a_crash: bool
 ) -> None:
     """A day later a crash came: its first enable with the heartbeat of that loss was refused, and writing 0 did not help."""
@@ -82,8 +82,11 @@ def test_a_lost_master_is_there_again_with_its_own_0_or_another_heartbeat(
         rig = handed_over(SmallRig(rig.settings))
     rig.answer(*writes)
     assert kept["lost_beats"] == ({} if is_found else {OWNER.host: [7]})
-    refused = handed_over(SmallRig(rig.settings)).answer(0, ENABLE, 1200, 0, 0, 7)
+    rig = handed_over(SmallRig(rig.settings))
+    refused = rig.answer(0, ENABLE, 1200, 0, 0, 7)
     assert (refused is None) is is_found
+    rig.write(0, 0)
+    assert rig.run(1.0).answer(0, ENABLE, 1200, 0, 0, 8 if is_found else 7) is None
 
 
 @pytest.mark.parametrize("action", LeaseAction)

@@ -90,6 +90,8 @@ RUN_COIL_AND_ENABLE_COIL = _each_coil
 """Without enable its last one ends what the others have begun."""
 SILENT = {WORD, FORCE, _coils, _each_coil, write_mask, WORD_AND_FORCE, _FLOATS}
 """Frames without a heartbeat."""
+WORD_ALONE = {WORD, _coils, _each_coil, write_mask}
+"""Frames of the control word, by whichever function: the same bytes."""
 
 
 def zeros_by_each_function(rig: SmallRig, peer: Peer) -> dict[str, Callable[[], None]]:
@@ -166,7 +168,9 @@ class Program:
     def is_mistaken_for(self, other: "Program") -> bool:
         """Whether words of the two, on one host, are told apart by nothing, for a connection is new."""
         is_lasting = self._connects == other._connects == "once"
-        return not is_lasting and bool(set(self.frames) & set(other.frames) & {WORD, FORCE})
+        return not is_lasting and any(
+            alike & {*self.frames} and alike & {*other.frames} for alike in (WORD_ALONE, {FORCE})
+        )
 
     @property
     def identity(self) -> str:

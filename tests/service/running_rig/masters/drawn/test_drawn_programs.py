@@ -18,7 +18,7 @@ SEEDS = (
     *(7, 44, 59, 100, 130, 171, 180, 200, 209, 211),
     *(6068, 6115, 6129, 6166, 6198, 6205, 6223, 6259, 6278),
     *(7002, 7012, 7034, 7078, 7180, 7244, 7278, 7293),
-    *(20265, 20323, 20431, 46717, 48176, 48242),
+    *(20265, 20323, 20431, 46717, 48176, 48242, 55539, 56117),
 )
 """What hung began so, or what went on was refused so, once."""
 STEPS, CYCLE_S = 20, 0.05
@@ -247,6 +247,21 @@ def test_two_programs_of_one_host_tare_beside_each_other_as_often_as_their_heart
         10,
         lambda cycle: rig.answer(4, cycle, peer=TWIN),
         lambda cycle: rig.answer(0, TARE, 0, 0, 0, 100 + cycle, peer=OTHER),
+        lambda _: rig.answer(0, TARE, peer=TWIN),
+    )
+    assert not any(refused for answer in answers[2:] for refused in answer)
+
+
+@pytest.mark.parametrize("lives", [True, False])
+def test_two_programs_of_one_host_tare_by_the_same_words_each_by_its_connection(lives: bool) -> None:
+    """By each tare of the one the other's was taken for one that came again, in each cycle and for good."""
+    rig = begun()
+    answers = flow(
+        rig,
+        10,
+        lambda cycle: rig.answer(4, 100 + cycle, peer=TWIN),
+        lambda cycle: rig.answer(1, 0, 0, 0, cycle if lives else 0, peer=OTHER),
+        lambda _: rig.answer(0, TARE, peer=OTHER),
         lambda _: rig.answer(0, TARE, peer=TWIN),
     )
     assert not any(refused for answer in answers[2:] for refused in answer)

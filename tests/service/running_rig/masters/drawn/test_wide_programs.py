@@ -1,5 +1,7 @@
 """Wider scenes: serial faces, certificates, more spellings, other leases, standstills."""
 
+from typing import Any
+
 import pytest
 
 from gateway.codes.refusals import RefusalReason
@@ -8,9 +10,9 @@ from gateway.registers.words import State
 from tests.service.running_rig.masters.drawn.laws import LEASE_S
 from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, TARE
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, TARE
 
-SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074
+SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074, 66800
 
 
 @pytest.mark.parametrize("first", SEEDS)
@@ -107,3 +109,55 @@ def test_a_tare_with_the_heartbeat_of_the_last_one_is_refused_however_late_it_co
     assert rig.answer(0, TARE, 0, 0, 0, 7, peer=OTHER) is None
     refused = rig.run(5.0).answer(0, TARE, 0, 0, 0, 7, peer=OTHER)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+
+
+@pytest.mark.parametrize("is_beside_another", [False, True])
+def test_behind_a_death_no_run_begins_again_of_a_program_that_hung_and_whose_run_another_one_had_ended(
+    is_beside_another: bool,
+) -> None:
+    """No enable had fallen, so that no stop was seen; and the 0 of a program beside it, which hung too, was its own."""
+    kept = dict[str, Any]()
+    rig, other = begun(kept), Peer(OTHER.host, OTHER.port + 1)
+    rig.write(0, 0, 0, 0, 0, 9, peer=other)
+    rig.write(1, 0, 0, 0, 7, peer=OTHER)
+    rig.write(0, CALIBRATE, peer=OTHER)
+    assert rig.state is State.CALIBRATING
+    rig.bank.mask_write(0, 0xFFFF & ~(ENABLE | CALIBRATE), 0, Peer("web"))
+    assert rig.run(0.1).state is State.OFF
+    for _ in range(2):
+        if is_beside_another:
+            rig.answer(0, 0, 0, 0, 0, 9, peer=other)
+        rig = begun(kept)
+        for _ in range(5):
+            rig.write(1, 0, 0, 0, 7, peer=OTHER)
+            refused = rig.answer(0, CALIBRATE, peer=OTHER)
+            assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+            rig.run(0.2)
+    rig.write(1, 0, 0, 0, 8, peer=OTHER)
+    assert rig.answer(0, CALIBRATE, peer=OTHER) is None, "its program goes on"
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_what_hung_begins_nothing_for_the_silence_of_a_gateway_that_stood_still(waits: bool) -> None:
+    """Three seconds in which its frames were not heard were three in which it had not sent any."""
+    rig = begun()
+    rig.is_cell_silent = True
+    assert rig.run(0.5).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    rig.is_cell_silent = False
+    rig.run(0.2).ticks += 310
+    if waits:
+        rig.answer(4, 7, peer=OTHER)
+    refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.run(3.1).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER) is None, "who is silent for so long decides anew"
+
+
+def test_behind_a_standstill_a_program_that_hung_does_not_undo_the_0_of_another_one_on_its_host() -> None:
+    """Within 0.8 s of that 0 its next frame would have come, and been refused: nobody was there to hear it."""
+    rig = begun()
+    for beat in (6, 7):
+        rig.run(0.05).write(0, ENABLE, 1200, 0, 0, beat, peer=OTHER)
+    rig.run(0.2).write(0, 0, peer=Peer(OTHER.host, OTHER.port + 1))
+    rig.run(0.2).ticks += 100
+    refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE and rig.state is State.OFF

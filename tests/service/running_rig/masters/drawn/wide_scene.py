@@ -13,6 +13,7 @@ from tests.service.running_rig.masters.drawn.programs import (
     SILENT,
     SPELLINGS,
     WORD,
+    WORD_ALONE,
     WORD_AND_FORCE,
     Frame,
     Program,
@@ -51,6 +52,7 @@ def _whole_block_as_read(rig: SmallRig, peer: Peer, word: int, force: int, beat:
 
 LOW_FLOATS = _low_floats(300, "word", "force")
 SILENT.update({LOW_FLOATS, _read_and_modify})
+WORD_ALONE.add(_read_and_modify)
 WIDE_SPELLINGS: dict[str, tuple[Frame, ...]] = {
     **SPELLINGS,
     "low floats": (_low_floats(300, "word", "force", "", "", "beat"),),
