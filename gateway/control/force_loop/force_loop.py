@@ -20,7 +20,7 @@ from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
-from gateway.control.force_loop.trim import LEARNING, TrimIntegral, blocked_way
+from gateway.control.force_loop.trim import LEARNING, USED_UP_SHARE, TrimIntegral, blocked_way
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
 from gateway.control.settings import ControlSettings, LoopTiming, Trim
@@ -90,7 +90,7 @@ class ForceLoop:
 
     def _tune(self, settings: ControlSettings, model: Bsfm) -> None:
         """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
-        self._measured, self._lead_settings = settings.timing, settings.lead
+        self._measured, self._lead_settings, self._trim_limit_v = settings.timing, settings.lead, settings.trim.limit_v
         if settings.timing:
             self._lead = LinearizedLagInverse(settings.timing.lags, settings.limits, model)
             self._tune_measured_trim(settings.trim, settings.timing)
@@ -162,8 +162,8 @@ class ForceLoop:
 
     @property
     def is_trim_at_limit(self) -> bool:
-        """Decide whether the trim stands at its limit."""
-        return self._trim.limited_by is not _NONE
+        """Decide whether the trim has used up its range. It has, too, a hair below, where noise and a moving target take it."""
+        return self._trim.limited_by is not _NONE or abs(self.trim_v) > USED_UP_SHARE * self._trim_limit_v
 
     @property
     def is_hunting(self) -> bool:
