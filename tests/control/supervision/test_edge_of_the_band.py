@@ -1,4 +1,4 @@
-"""What is told at the edge of the band comes once, and does not come and go with the noise of the cell."""
+"""What is told at the edge of the band, or of a trim's range, does not come and go with the noise of the cell."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -6,8 +6,13 @@ from random import Random
 
 import pytest
 
+from gateway.codes.warning_bits import WarningBit
+from gateway.control import Trim
+from gateway.control.force_loop.trim import TrimIntegral
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.in_band import SettlingCheck
+from gateway.registers.words import LimitedBy
+from tests.control.bench import enabled
 from tests.control.supervision.test_in_band import UNREACHABLE_S, at, demand
 
 TICK_S = 0.01
@@ -55,3 +60,23 @@ def test_a_band_that_comes_and_goes_without_pause_is_told(noise_n: float, is_tol
     told = [one.is_noisy for one in play(SettlingCheck(UNREACHABLE_S), forces_n, TICK_S, in_band_time_s)]
     assert any(told) is is_told
     assert sum(now and not before for before, now in pairwise(told)) == is_told, "and once"
+
+
+def test_a_trim_that_has_used_up_its_range_does_not_come_and_go_with_a_moving_target() -> None:
+    """Each step of a ramp faded the trim by a hair, and each reading took it back: A340 came a hundred times a second."""
+    bench = enabled(gain_n_per_v=4.0)
+    bench.force(20.0)
+    bench.run(3.0)
+    first = len(bench.history)
+    bench.write(force_setpoint_n=30.0, force_ramp_n_per_s=5.0)
+    bench.run(1.0)
+    told = [bool(record.output.warnings & WarningBit.TRIM_SATURATED) for record in bench.history[first:]]
+    assert told == [True] * len(told)
+
+
+def test_a_travel_of_nothing_leaves_a_trim_at_its_limit() -> None:
+    """A payload that counts along the ramp moved the target by a rounding error."""
+    trim = TrimIntegral(Trim(gain_v_per_n_s=1.0, limit_v=0.5))
+    trim.integrate(9.0, 1.0)
+    trim.travel(1e-17)
+    assert (trim.value_v, trim.limited_by) == (0.5, LimitedBy.TRIM_RANGE)
