@@ -27,7 +27,7 @@ SEEN_SAMPLES: Final = 3  # the same, of a slow one
 CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
 FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
 LEAST_PACE: Final = 0.02
-USED_UP_SHARE: Final = 0.95  # of the limit, at which a trim has used up its range
+NEAR_LIMIT: Final = 0.8  # as a share of it, above which a trim that has reached it has not left it
 LEARNING: Final = (
     LimitedBy.NONE,
     LimitedBy.TRIM_RANGE,

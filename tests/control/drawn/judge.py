@@ -202,10 +202,12 @@ class Judge(OutputLaws):
 
     def _judge_alarms(self, warnings: WarningBit) -> None:
         """What has come at a force stays, or goes for good: it does not come and go."""
+        if warnings == self.warnings:
+            return
         self.come.update(TOLD & warnings & ~self.warnings)
         self.warnings = warnings
         if often := [bit.name for bit, times in self.come.items() if times > MOST_OFTEN]:
-            self.complain(f"{often} come for the {MOST_OFTEN + 1}rd time")
+            self.complain(f"{often} come more than {MOST_OFTEN} times")
 
     def _judge_fault(self, record: Record) -> None:
         fault, machine, limits = record.output.fault, self.rig.machine, self.rig.settings.limits
