@@ -39,7 +39,12 @@ def already_exists(target: Path, instead: str = "--force overwrites it") -> CliE
 
 def no_state_directory(directory: Path) -> CliError:
     """Return E106: the verb needs a state directory that is there."""
-    return CliError(f"E106 {directory}: there is no such state directory; --state DIR names another", exit_codes.DATA)
+    from gateway.processes.state_directory import left_aside
+
+    todo = "--state DIR names another"
+    if aside := left_aside(directory):
+        todo = f"a restore was killed halfway, and it is in {aside}: `run` or `restore` puts it back"
+    return CliError(f"E106 {directory}: there is no such state directory; {todo}", exit_codes.DATA)
 
 
 def no_such_recording(path: Path) -> CliError:

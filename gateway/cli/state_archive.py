@@ -24,7 +24,7 @@ from gateway.audit.audit_file import HEAD
 from gateway.plain_file import check_plain, open_plain_stream
 from gateway.processes import state_lock
 from gateway.processes.durable_file import lock_directory, make_path, replacing_file, sync_path
-from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING
+from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING, place_before_restore, place_of_restore
 
 _MANIFEST: Final = "backup.json"
 _TOP: Final = "state"
@@ -96,7 +96,7 @@ def unpack_state(source: Path, state: Path) -> Path | None:
 def _beside(state: Path) -> Iterator[Path]:
     """Yield an empty directory beside the state, gone behind the block. It has one name, so that what a killed restore has
     left, a whole state, goes with the next one; while another restore is at work on it, OSError."""
-    beside = state.with_name(f".{state.name}.restored")
+    beside = place_of_restore(state)
     with contextlib.suppress(FileNotFoundError), lock_directory(beside):
         shutil.rmtree(beside)
     beside.mkdir(mode=0o700)
@@ -143,7 +143,9 @@ def _sync_all(folder: Path) -> None:
 
 
 def _put_in_place(fresh: Path, state: Path) -> Path | None:
-    """Exchange the two; OSError, and what was there is there again, where the disk refuses."""
+    """Exchange the two; OSError, and what was there is there again, where the disk refuses. What `put_back` knows a killed
+    restore by is on the disk before."""
+    sync_path(state.parent)
     previous = _set_aside(state)
     try:
         fresh.rename(state)
@@ -248,6 +250,6 @@ def _set_aside(state: Path) -> Path | None:
     if not state.exists() or not any(state.iterdir()):
         return None
     number = 1
-    while (previous := state.with_name(f"{state.name}.before-restore-{number}")).exists():
+    while (previous := place_before_restore(state, number)).exists():
         number += 1
     return state.rename(previous)

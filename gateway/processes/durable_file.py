@@ -16,6 +16,7 @@ import os
 import stat
 import time
 from collections.abc import Iterator
+from glob import escape
 from itertools import count
 from pathlib import Path
 from typing import Any, BinaryIO, Final
@@ -162,7 +163,7 @@ def replacing_file(target: Path, mode: int = 0o666) -> Iterator[BinaryIO]:
 
 def open_beside(target: Path, mode: int) -> tuple[Path, int]:
     """Return path and descriptor of an empty file beside a target that nobody else writes: the first whose lock is free. One
-    that a killed process has left is used again. OSError where there is none."""
+    that a killed process has left is used again, further ones are removed. OSError where there is none."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
     for number in count():
         beside = target.with_name(f".{target.name}.{number}{_BESIDE}")
@@ -170,12 +171,22 @@ def open_beside(target: Path, mode: int) -> tuple[Path, int]:
         try:
             if _is_ours(descriptor, beside):
                 os.ftruncate(descriptor, 0)
+                _remove_left(beside, target)
                 return beside, descriptor
         except BaseException:
             os.close(descriptor)
             raise
         os.close(descriptor)
     raise AssertionError("numbers have no end")
+
+
+def _remove_left(ours: Path, target: Path) -> None:
+    """Remove what others that were killed have left beside the target, whose locks are free."""
+    for path in target.parent.glob(f".{escape(target.name)}.*{_BESIDE}"):
+        if path != ours and path.name[len(target.name) + 2 : -len(_BESIDE)].isdecimal():
+            with contextlib.suppress(OSError), closing_descriptor(open_plain(path, os.O_WRONLY)) as descriptor:
+                if _is_ours(descriptor, path):
+                    path.unlink()
 
 
 def _is_ours(descriptor: int, path: Path) -> bool:

@@ -73,7 +73,7 @@ def test_what_is_restored_is_on_the_disk_before_it_is_the_state(
     monkeypatch.setattr(state_archive, "sync_path", lambda path: synced.append((path.name, fresh.exists())))
     unpack_state(tmp_path / "b.tar.gz", fresh)
     names = ["calibrations", "0001.yaml", "state"]
-    assert synced == [*((name, False) for name in names), (tmp_path.name, True)]
+    assert synced == [*((name, False) for name in (*names, tmp_path.name)), (tmp_path.name, True)]
 
 
 @pytest.mark.parametrize("manifest", [b'{"format": 2}', b'{"format": "1"}', b'{"format": []}'])

@@ -140,6 +140,19 @@ def test_what_a_killed_writer_has_left_of_a_file_of_people_s_is_used_again(tmp_p
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("kept.tar.gz", b"one")]
 
 
+def test_what_the_second_of_two_killed_writers_has_left_goes_with_the_next_file(tmp_path: Path) -> None:
+    """It stayed until two wrote at once again. What belongs to another file, or to who is at it now, stays."""
+    for name in (".kept.1.part", ".kept.7.part", ".kept.x.1.part", ".kept.x.part"):
+        (tmp_path / name).write_bytes(b"half of it")
+    with replacing_file(tmp_path / "kept") as slow:
+        with replacing_file(tmp_path / "kept") as quick:
+            slow.write(b"slow")
+            quick.write(b"quick")
+        assert (tmp_path / "kept").read_bytes() == b"quick"
+    found = sorted((path.name, path.read_bytes()) for path in tmp_path.iterdir())
+    assert found == [(".kept.x.1.part", b"half of it"), (".kept.x.part", b"half of it"), ("kept", b"slow")]
+
+
 def test_two_that_write_one_file_at_once_mix_nothing(tmp_path: Path) -> None:
     """Each `report` had the same name beside it."""
     target = tmp_path / "support.tar.gz"

@@ -20,7 +20,7 @@ from gateway.control.force_loop.lag_inverse import LinearizedLagInverse
 from gateway.control.force_loop.lead_compensator import LeadCompensator
 from gateway.control.force_loop.measured_trim import MeasuredTrim
 from gateway.control.force_loop.transient_estimate import TransientEstimate
-from gateway.control.force_loop.trim import LEARNING, TrimIntegral, blocked_way
+from gateway.control.force_loop.trim import LEARNING, NEAR_LIMIT, TrimIntegral, blocked_way
 from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.limits import TICK_S, NotFiniteError, VoltageLimiter, strongest
 from gateway.control.settings import ControlSettings, LoopTiming, Trim
@@ -56,7 +56,7 @@ class ForceLoop:
         self._approach, self.feedforward_v, self.limited_by = Approach(), 0.0, LimitedBy.NONE
         self.settling = SettlingCheck(settings.supervision.unreachable_s)
         self.leaps = LeapCheck(settings.supervision.sample_quantum_n)
-        self._was_touching = self._has_leapt = False
+        self._was_touching = self._has_leapt = self._was_full = False
         self._wanted_v = 0.0
 
     def take_timing(self, timing: TimingCompensation | None) -> None:
@@ -90,7 +90,7 @@ class ForceLoop:
 
     def _tune(self, settings: ControlSettings, model: Bsfm) -> None:
         """LeadCompensator and trim by the measured response where there is one, else by the rig file."""
-        self._measured, self._lead_settings = settings.timing, settings.lead
+        self._measured, self._lead_settings, self._limit_v = settings.timing, settings.lead, settings.trim.limit_v
         if settings.timing:
             self._lead = LinearizedLagInverse(settings.timing.lags, settings.limits, model)
             self._tune_measured_trim(settings.trim, settings.timing)
@@ -162,8 +162,8 @@ class ForceLoop:
 
     @property
     def is_trim_at_limit(self) -> bool:
-        """Decide whether the trim stands at its limit."""
-        return self._trim.limited_by is not _NONE
+        """Decide whether the trim stands at its limit, or has and is near: noise and a moving target take it off by a hair."""
+        return self._trim.limited_by is not _NONE or (self._was_full and abs(self.trim_v) > NEAR_LIMIT * self._limit_v)
 
     @property
     def is_hunting(self) -> bool:
@@ -212,7 +212,7 @@ class ForceLoop:
             event = self._step_force(demand, inputs) if demand.mode is _FORCE else self._step_voltage(demand, inputs)
         except (ModelError, NotFiniteError) as error:
             return _fault_of(error)
-        self._was_touching = inputs.touching
+        self._was_touching, self._was_full = inputs.touching, self.is_trim_at_limit
         return event
 
     def descend(self, demand: Demand, dt_s: float, given_n: float) -> Moved:

@@ -124,7 +124,7 @@ class MeasuredTrim:
     def take_volts(self, value_v: float) -> float:
         """Return what the correction asks for, within the limit of the rig."""
         self.value_v, limited_by = trim_limited(value_v, self._settings.limit_v)
-        if limited_by:
+        if limited_by or not self.value_v:  # newtons at their limit that make no volts are not what limits the output
             self.limited_by = limited_by
         return self.value_v
 

@@ -27,6 +27,7 @@ SEEN_SAMPLES: Final = 3  # the same, of a slow one
 CALM_S: Final = 3.0  # so long between two of them, and it is not the trim that swings
 FREE_SWINGS: Final = 3  # what a step, or a workpiece, may make of it
 LEAST_PACE: Final = 0.02
+NEAR_LIMIT: Final = 0.8  # as a share of it, above which a trim that has reached it has not left it
 LEARNING: Final = (
     LimitedBy.NONE,
     LimitedBy.TRIM_RANGE,
@@ -85,8 +86,8 @@ class TrimIntegral:
     def travel(self, moved_n: float) -> None:
         """Fade the correction: the applied target moved by so much, N."""
         if moved_n and self.value_v:
-            self.value_v *= exp(-abs(moved_n) / self._settings.memory_n)
-            self.limited_by = LimitedBy.NONE
+            faded_v = self.value_v * exp(-abs(moved_n) / self._settings.memory_n)
+            self.value_v, self.limited_by = trim_limited(faded_v, self._settings.limit_v)
         self._moved_n += moved_n
         if abs(self._moved_n) > NEW_TARGET_N:
             self._begin_target()

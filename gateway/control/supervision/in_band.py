@@ -4,9 +4,11 @@ In band means: target at its goal, contact, and the measured force within the to
 break. Without contact there is no band: a reading of 0.2 N in free air is not a held force. Target-unreachable means
 the same wait in vain, longer, and that by the force behind a low-pass: of a cell whose noise is as large as the band single
 readings are inside however far off the force is. With an in-band time that a single reading fills they are in band, but end no
-wait, and where the target is unreachable they are not in band, either. On a long ramp the force is compared with where the
-target is now, more roughly: air that fails on its way would else be told at its end, minutes later. A target that
-comes no nearer to its setpoint, because the first rise looks wrong again and again, is missed as well.
+wait, and where the target is unreachable they are not in band, either. A force that was missed is found again where it is well
+inside the band; at its very edge, where noise would let the alarm come and go, once it has been inside for as long as it takes
+to be missed. On a long ramp the force is compared with where the target is now, more roughly: air that fails on its way would
+else be told at its end, minutes later. A target that comes no nearer to its setpoint, because the first rise looks wrong again
+and again, is missed as well.
 
 Bounds: Supervision.unreachable_s, Defaults.in_band_time_s and Defaults.in_band_tolerance_n in control/settings.py.
 """
@@ -23,6 +25,8 @@ _WAIT, _MOVE, _SETTLE = StateEvent.WAIT, StateEvent.MOVE, StateEvent.SETTLE
 _RAMP_BANDS: Final = 2.0  # tolerances, so far a force in contact may be off on a ramp, ...
 _RAMP_LATE_S: Final = 0.5  # ... and what the ramp gains in this time: lags that nobody has measured
 _SMOOTHING_S: Final = 0.3  # of the force that is called missed
+_LASTING_S: Final = 0.5  # inside, from which on it counts against noise: less comes and goes
+_WELL_INSIDE_SHARE: Final = 0.8  # of the tolerance, within which a missed force is found again at once
 _NOISY_S: Final = 5.0  # beyond the in-band time, so much more neither in band nor unreachable than in band; ...
 _NOISY_WAITS: Final = 2.0  # ... and so many times what makes a target unreachable: that is told first
 _ANSWER_N: Final = 2.0  # expected force from which a silent cell in voltage mode is worth a warning
@@ -31,7 +35,8 @@ _SLACK_N: Final = 1.0  # ... but for so much, which zero and noise may hide
 
 
 class InBandTimer:
-    """unreachable_s: how long out of band until the target counts as unreachable. Times are monotonic seconds."""
+    """unreachable_s: how long out of band until the target counts as unreachable; inside_s: how long it has been inside without
+    a break. Times are monotonic seconds."""
 
     def __init__(self, unreachable_s: float) -> None:
         self._unreachable_s = unreachable_s
@@ -43,20 +48,38 @@ class InBandTimer:
 
     def restart(self) -> None:
         """Restart both timers: nothing is pursued, or something new."""
-        self._in_since_s = inf
+        self._in_since_s = self._well_since_s = inf
+        self.inside_s = 0.0
         self._out_since_s = inf
         self.in_band = False
         self.unreachable = False
 
-    def update(self, now_s: float, is_inside: bool, in_band_time_s: float, *, is_out: bool | None = None) -> None:
+    def update(
+        self,
+        now_s: float,
+        is_inside: bool,
+        in_band_time_s: float,
+        *,
+        is_out: bool | None = None,
+        is_well_inside: bool = False,
+    ) -> None:
         """Compare once more. is_inside: the comparison of this moment, with the target at its goal; is_out: whether that is
-        missed, where it is not the same."""
+        missed, where it is not the same; is_well_inside: whether it is so far inside that it need not be for long to be
+        missed no more."""
         self._in_since_s = min(self._in_since_s, now_s) if is_inside else inf
-        inside_s = now_s - self._in_since_s
-        is_out = not is_inside if is_out is None else is_out and inside_s < max(in_band_time_s, _SMOOTHING_S)
+        self._well_since_s = min(self._well_since_s, now_s) if is_well_inside else inf
+        self.inside_s = inside_s = now_s - self._in_since_s
+        well_s = now_s - self._well_since_s
+        is_found = well_s >= max(in_band_time_s, _SMOOTHING_S) or inside_s >= max(in_band_time_s, self._unreachable_s)
+        is_out = not is_inside if is_out is None else is_out and not is_found
         self._out_since_s = min(self._out_since_s, now_s) if is_out else inf
         self.unreachable = now_s - self._out_since_s >= self._unreachable_s
         self.in_band = inside_s >= in_band_time_s and not self.unreachable
+
+    @property
+    def is_lasting(self) -> bool:
+        """Decide whether the force is in band, and has not only just come into it."""
+        return self.in_band and self.inside_s >= _LASTING_S
 
     def go_along(self, now_s: float, is_near: bool) -> None:
         """Compare on the way to the goal: nothing is in band yet, and what is not near counts as out of it."""
@@ -86,7 +109,7 @@ class SettlingCheck:
     """Decides which event of the state table a step of the force loop is. Times are monotonic seconds.
 
     unreachable_s: how long out of band, or without an answer in voltage mode, until the target counts as unreachable. is_noisy:
-    readings keep crossing the edges of the band, so that the force is neither missed nor held for half of the time.
+    readings keep crossing the edges of the band, so that for half of the time the force is neither missed nor lastingly held.
     """
 
     def __init__(self, unreachable_s: float) -> None:
@@ -146,9 +169,11 @@ class SettlingCheck:
             self._follow_ramp(demand, inputs, applied_n)
             return _MOVE
         may_be = inputs.touching and abs(demand.force_n - applied_n) <= tolerance_n
-        inside = may_be and abs(inputs.reading.contact_n - demand.force_n) <= tolerance_n
-        out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > tolerance_n
-        self._band.update(inputs.now_s, inside, in_band_time_s, is_out=out)
+        off_n = abs(inputs.reading.contact_n - demand.force_n)
+        well_n = tolerance_n * (_WELL_INSIDE_SHARE if self._band.unreachable else 1.0)
+        inside, well_inside = may_be and off_n <= tolerance_n, may_be and off_n <= well_n
+        out = not may_be or abs(self._smooth(inputs.reading) - demand.force_n) > well_n
+        self._band.update(inputs.now_s, inside, in_band_time_s, is_out=out, is_well_inside=well_inside)
         self._judge_noise(inputs.now_s, in_band_time_s)
         if self._band.in_band:
             return _SETTLE
@@ -162,7 +187,7 @@ class SettlingCheck:
         in the band takes back what it has lasted: it neither ends what has been noisy nor hides it."""
         passed_s, self._judged_s = max(0.0, now_s - self._judged_s), now_s
         longest_s = in_band_time_s + max(_NOISY_S, _NOISY_WAITS * self._unreachable_s)
-        self._noisy_s = max(0.0, self._noisy_s + (-passed_s if self._band.in_band else passed_s))
+        self._noisy_s = max(0.0, self._noisy_s + (-passed_s if self._band.is_lasting else passed_s))
         if self._band.unreachable:
             self._noisy_s = 0.0
         if self._noisy_s > longest_s:

@@ -24,6 +24,7 @@ from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.scheduling import priority
+from gateway.processes.state_directory import put_back
 from gateway.processes.state_lock import hold_state_lock
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
 from gateway.service.heartbeat_memory import HeartbeatMemory
@@ -46,7 +47,9 @@ _REFUSED: Final = frozenset({exit_codes.DATA, exit_codes.PERMISSION, exit_codes.
 def run(options: RunOptions) -> int:
     """Run one rig until it is told to stop; the process's exit code."""
     state = options.state_directory
+    found = ""
     with contextlib.suppress(OSError):  # a disk that syncs no name is no reason not to control
+        found = put_back(state)
         make_path(state)
     state.mkdir(parents=True, exist_ok=True, mode=0o700)
     with hold_state_lock(state) as is_ours:
@@ -60,8 +63,9 @@ def run(options: RunOptions) -> int:
         too_few = raise_descriptor_limit()
         try:
             with EventLog(source="guardian", file=EventFile(state)) as log, SignalPipe() as signals:
-                if too_few:
-                    log("limit", too_few)
+                for cause, said in (("limit", too_few), ("start", found)):
+                    if said:
+                        log(cause, said)
                 starter = ChildStarter(
                     options.rig, simulate=options.simulate, state=state, say=partial(log, "children")
                 )

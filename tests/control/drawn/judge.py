@@ -1,7 +1,7 @@
 """What must hold of force and voltage, whatever the machine is: by the contract of the registers and the true force, and not by
 asking the code. Laws of a held force count from when nobody has changed anything for long enough (`calm_s`)."""
 
-from collections import deque
+from collections import Counter, deque
 from math import cos, inf, isfinite
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 TOLD = WarningBit.TARGET_UNREACHABLE | WarningBit.TRIM_SATURATED | WarningBit.FORCE_UNSTEADY
 LONG_S = 3.0
+MOST_OFTEN = 2  # that an alarm comes while nobody changes anything
 
 
 class Judge(OutputLaws):
@@ -34,6 +35,7 @@ class Judge(OutputLaws):
         self.top_n: float | None = None
         self.top_why = ""
         self.hunted = False
+        self.warnings, self.come = WarningBit(0), Counter[WarningBit]()
         self.state = State.OFF
         self.last_sample_s = self.told_s = -1.0
         self.counted_kg, self.direction = 0.0, 1.0
@@ -44,6 +46,7 @@ class Judge(OutputLaws):
     def changed(self) -> None:
         """Somebody has asked for something else, or something has befallen."""
         self.calm_since_s, self.top_n, self.hunted = self.rig.now_s, None, False
+        self.come.clear()
 
     def bound(self, top_n: float, why: str) -> None:
         """The true force goes no higher until something else is asked for."""
@@ -139,6 +142,7 @@ class Judge(OutputLaws):
         self.judge_registers(record, dt_s)
         self._judge_over_force(record)
         self._judge_measured(record)
+        self._judge_alarms(output.warnings)
         if output.state is State.FAULT and self.state is not State.FAULT and not self.is_spoilt:
             self._judge_fault(record)
         self.state = output.state
@@ -195,6 +199,15 @@ class Judge(OutputLaws):
         read_n = sample.force_n - zero_n + self.told_weight_n
         if not abs(shown_n - read_n) <= slack_n and zero_n == self.zero_n:  # a tare counts from the next reading on
             self.complain(f"{shown_n} N are told, {read_n} N are read")
+
+    def _judge_alarms(self, warnings: WarningBit) -> None:
+        """What has come at a force stays, or goes for good: it does not come and go."""
+        if warnings == self.warnings:
+            return
+        self.come.update(TOLD & warnings & ~self.warnings)
+        self.warnings = warnings
+        if often := [bit.name for bit, times in self.come.items() if times > MOST_OFTEN]:
+            self.complain(f"{often} come more than {MOST_OFTEN} times")
 
     def _judge_fault(self, record: Record) -> None:
         fault, machine, limits = record.output.fault, self.rig.machine, self.rig.settings.limits

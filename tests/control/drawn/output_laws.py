@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from tests.control.drawn.rig import DrawnRig
 
 TICK_S = 0.01
-CALIBRATED_V = 8.0  # where the calibration ends, more newtons are no more volts
 
 
 class OutputLaws:
@@ -72,7 +71,7 @@ class OutputLaws:
         if abs(output.trim_v) == self.rig.settings.trim.limit_v > 0.0 and output.limited_by is LimitedBy.NONE:
             self.complain(f"trim {output.trim_v} at its limit, and nothing told")
         if output.limited_by is LimitedBy.TRIM_RANGE:
-            is_so = is_so and (abs(output.trim_v) > 0.0 or output.feedforward_v >= CALIBRATED_V)
+            is_so = is_so and output.trim_v != 0.0
         if not is_so:
             self.complain(
                 f"{voltage_v} V of {output.feedforward_v} and {output.trim_v}, limited by {output.limited_by.name}"

@@ -8,21 +8,22 @@ from tests.control.drawn.scene import Scene
 from tests.control.drawn.wide_scene import WideScene
 
 SCENES = 10
-KEPT = 726, 1135, 3467, 10191
-"""A swap beside a trim at its limit, one to the first measured response, single readings that hid a force that was off, and a
-target that was held back for good."""
+KEPT = 726, 1135, 3467, 8014, 8114, 10191
+"""A swap beside a trim at its limit, one to the first measured response, single readings that hid a force that was off, noise
+at the very edge of the band, a trim at its limit beside a payload on its way, and a target that was held back for good."""
 WIDE_SCENES = 3
-WIDE_KEPT = 2005, 3083
-"""A pull whose pressure came with the readback of a slow valve, and a force that rose when it was lowered."""
+WIDE_KEPT = 2005, 3083, 8063, 8116, 30088
+"""A pull whose pressure came with the readback of a slow valve, a force that rose when it was lowered, a trim in newtons beyond
+the calibration's end, an alarm that came and went at the very edge of the band, and one of a trim that noise moves."""
 
 
 def test_a_force_keeps_to_its_limits_arrives_and_tells_whatever_machine_and_master_are(budget: int) -> None:
-    """Takes two seconds of processor, a sixth of one for each scene of a quarter of a minute."""
+    """Takes three seconds of processor, a sixth of one for each scene of a quarter of a minute."""
     played = [Scene(seed).play() for seed in (*KEPT, *range(SCENES * budget))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []
 
 
 def test_the_same_with_pulls_stick_and_slip_creep_play_hard_contacts_and_careless_rig_files(budget: int) -> None:
-    """Takes three seconds of processor, two thirds of one for each scene of a third of a minute."""
+    """Takes five seconds of processor, two thirds of one for each scene of a third of a minute."""
     played = [WideScene(seed).play() for seed in (*WIDE_KEPT, *range(WIDE_SCENES * budget))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []

@@ -230,12 +230,12 @@ def test_a_force_whose_single_readings_leave_the_band_is_noisy_and_one_that_must
     assert not check.is_noisy
 
 
-@pytest.mark.parametrize(("inside", "is_noisy"), [(4, True), (16, False)])
-def test_moments_in_the_band_do_not_hide_that_the_force_leaves_it_most_of_the_time(inside: int, is_noisy: bool) -> None:
+@pytest.mark.parametrize(("inside", "of", "is_noisy"), [(4, 20, True), (16, 20, True), (198, 200, False)])
+def test_moments_in_the_band_do_not_hide_that_the_force_keeps_leaving_it(inside: int, of: int, is_noisy: bool) -> None:
     """A cell of 0.7 N rms and a band of 1 N: in_band came and went four times a second, and nothing was told for good."""
     check, seen = SettlingCheck(UNREACHABLE_S), []
     for k in range(2000):
-        off_n = 0.0 if k % 20 < inside else 1.5 * (-1) ** k
+        off_n = 0.0 if k % of < inside else 1.5 * (-1) ** (k // of)
         reading = Reading(contact_n=10.0 + off_n, is_new=True, is_usable=True, interval_s=0.01)
         check.judge_force(demand(in_band_time_s=0.02), at(0.01 * k)._replace(reading=reading), 10.0, 10.0)
         seen.append((check.in_band, check.is_noisy))

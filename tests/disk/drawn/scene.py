@@ -17,7 +17,7 @@ from tests.disk.watched_disk import watching
 
 _BEGAN_S: Final = 1.7e9
 _UNFIT: Final = ("[Errno", "Traceback", "internal error", "None", "Error(")
-_BESIDE: Final = (".new", ".0.part")  # a second one is of two that wrote at once: few, and used again then
+_BESIDE: Final = (".new", ".part")
 _HIDDEN: Final = frozenset((".summaries.json",))
 DAY_S: Final = 86400.0
 _MOST_WORK: Final = 300
@@ -260,11 +260,7 @@ class Scene:
             return
         with self.disk.aside():
             names = [path.name for path in Path(self.disk.folder).rglob("*")]
-        if left := [
-            name
-            for name in names
-            if name.endswith(_BESIDE) or (name[0] == "." and name not in _HIDDEN and not name.endswith(".part"))
-        ]:
+        if left := [name for name in names if name.endswith(_BESIDE) or (name[0] == "." and name not in _HIDDEN)]:
             self.complain(f"{left} are left for ever")
 
     def _close(self) -> None:

@@ -88,4 +88,11 @@ DEFECTS = (
            "suppress(FileNotFoundError), lock_directory(beside):\n        shutil.rmtree(beside)\n    beside.mkdir(mode=0o700)",
            "suppress(FileNotFoundError), lock_directory(beside):\n        pass\n    beside.mkdir(mode=0o700, exist_ok=True)",
            ("cli/test_state_archive.py",)),
+    Defect("a gateway begins anew where a restore was killed", "service/supervisor/guardian.py",
+           "        found = put_back(state)\n", "", ("cli/test_killed_restore.py",)),
+    Defect("what the second of two killed writers has left stays", "processes/durable_file.py",
+           "                _remove_left(beside, target)\n", "", ("processes/test_durable_file.py",)),
+    Defect("what another is writing is removed", "processes/durable_file.py",
+           "                if _is_ours(descriptor, path):\n                    path.unlink()",
+           "                if True:\n                    path.unlink()", ("processes/test_durable_file.py",)),
 )  # fmt: skip

@@ -25,10 +25,13 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
     Wholly or not at all. The gateway must not be running.
     """
     from gateway.cli.state_archive import ArchiveError, names_in, unpack_state
+    from gateway.processes.state_directory import put_back
 
     directory = state.directory
     try:
         names = names_in(file)
+        if not dry_run and (said := put_back(directory)):
+            click.echo(said, err=True)
         if directory.is_dir() and any(directory.iterdir()) and not force:
             raise already_exists(directory, "--force replaces it and keeps the old one")
         if dry_run:

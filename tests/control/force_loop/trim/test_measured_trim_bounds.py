@@ -182,6 +182,14 @@ def test_it_stands_at_its_limit_by_volts_too_and_no_longer_than_at_that_target()
     assert one.limited_by is LimitedBy.NONE
 
 
+def test_newtons_at_their_limit_that_make_no_volts_limit_nothing() -> None:
+    """Beyond the calibration's end: TRIM_RANGE was told of 0 V, and not CALIBRATION_RANGE."""
+    one = trim()
+    held(one, 9.0, 2.0)
+    assert (one.take_volts(0.3), one.limited_by) == (0.3, LimitedBy.TRIM_RANGE)
+    assert (one.take_volts(0.0), one.limited_by) == (0.0, LimitedBy.NONE)
+
+
 def test_what_a_second_direction_agrees_on_is_not_added_to_what_the_first_had_learned() -> None:
     one = trim()
     one.travel(20.0)

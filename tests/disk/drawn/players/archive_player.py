@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.cli.state_archive import unpack_state
+from gateway.processes.state_directory import put_back
 from gateway.processes.state_lock import hold_state_lock
 from tests.disk.drawn.players.player import Player
 
@@ -98,7 +99,7 @@ class ArchivePlayer(Player):
             if before and (not (place := re.search(r"is in (\S+)", said)) or snapshot(Path(place[1])) != before):
                 self.complain(f"what was there before is not where it is said to be: {said}")
         elif now is None and before and "before-restore" in said:
-            self._take_back()
+            self._take_back(is_told=True)
         elif now != before and not (self._is_in_doubt() and now in wanted):
             self.complain(f"a restore was refused, and {self.cell} is another one: {said}")
 
@@ -120,11 +121,12 @@ class ArchivePlayer(Player):
         """All was done but the folder's fsync."""
         return any(call.what in ("fsync", "open") for call in self.disk.refused)
 
-    def _take_back(self) -> None:
-        """A person finds what was set aside, where the state directory is missing."""
+    def _take_back(self, *, is_told: bool = False) -> None:
+        """The next start finds what a killed restore has set aside; a person, what a refused one has told of."""
         with self.disk.aside():
+            put_back(self.cell)
             aside = sorted(self.scene.outside.glob("cell.before-restore-*"), key=lambda path: path.stat().st_ino)
-            if aside and not self.cell.exists() and None not in self.cells:
+            if aside and not self.cell.exists() and is_told:
                 aside[-1].rename(self.cell)
             for path in self.scene.outside.glob("cell.before-restore-*"):
                 shutil.rmtree(path)
