@@ -15,8 +15,9 @@ import hypothesis
 import pytest
 
 from tests.gate.budgets import SAMPLED, leave_out_long
+from tests.gate.one_compiler import OneCompiler
 from tests.gate.tried_again import TriedAgain
-from tests.gate.workers import ForkedWorkers, OneCompiler
+from tests.gate.workers import ForkedWorkers
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
 
