@@ -63,3 +63,19 @@ def test_hypothesis_draws_a_third_of_the_examples_in_a_push_and_never_none(is_pu
 
 def test_where_no_number_is_said_it_is_that_of_a_hundred() -> None:
     assert settings().max_examples == examples(100)
+
+
+@pytest.mark.parametrize(("in_silence", "left"), [(False, ["short", "long"]), (True, ["short"])])
+def test_what_needs_the_bigger_budget_does_not_run_without_it(in_silence: bool, left: list[str]) -> None:
+    class Item:
+        def __init__(self, name: str, *keywords: str) -> None:
+            self.name, self.keywords, self.marks = name, keywords, list[str]()
+
+        def add_marker(self, mark: pytest.MarkDecorator) -> None:
+            self.marks.append(mark.name)
+
+    items: list[Any] = [Item("short"), Item("long", "long")]
+    short, long = items
+    leave_out_long(items, in_silence=in_silence)
+    assert [item.name for item in items] == left
+    assert (short.marks, long.marks) == ([], ["skip"])

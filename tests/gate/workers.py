@@ -2,7 +2,6 @@
 is imported once. Who is free takes the next group of tests from a pipe that all share."""
 
 import ctypes
-import fcntl
 import os
 import platform
 import signal
@@ -12,9 +11,9 @@ import traceback
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from mmap import mmap
-from multiprocessing.connection import Connection, Pipe, wait
+from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from threading import RLock
+from selectors import EVENT_READ, PollSelector
 from types import ModuleType
 from typing import Any, Final, NamedTuple
 
@@ -40,8 +39,24 @@ def is_needed(report: pytest.TestReport) -> bool:
     return is_told or bool(report.user_properties)
 
 
+def is_plain(report: pytest.TestReport) -> bool:
+    """Return whether nothing is to be told of a phase but that it went well, and how long it took."""
+    return report.passed and not (report.sections or report.user_properties or hasattr(report, "wasxfail"))
+
+
+class Plain(NamedTuple):
+    """What such a report says beside its test."""
+
+    when: Any
+    duration_s: float
+
+    def report_of(self, nodeid: str, location: tuple[str, int | None, str]) -> pytest.TestReport:
+        return pytest.TestReport(nodeid, location, {}, "passed", None, self.when, duration=self.duration_s)
+
+
 class Telling:
-    """Tells of each test of a worker, at the test's end, what it came to. When the session ends nobody may listen any more."""
+    """Tells of each test of a worker, at the test's end, what it came to, of most in two words: a whole report
+    brings all keywords of its test along. When the session ends nobody may listen any more."""
 
     def __init__(self, session: pytest.Session, told: Connection) -> None:
         self._config, self._told = session.config, told
@@ -50,7 +65,10 @@ class Telling:
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if is_needed(report):
             pack = self._config.hook.pytest_report_to_serializable
-            self._reports.append(pack(config=self._config, report=report))
+            packed = (
+                Plain(report.when, report.duration) if is_plain(report) else pack(config=self._config, report=report)
+            )
+            self._reports.append(packed)
 
     def pytest_runtest_logfinish(self, nodeid: str, location: tuple[str, int | None, str]) -> None:
         self._told.send((nodeid, location, self._reports))
@@ -163,6 +181,7 @@ class ForkedWorkers:
         self._workers: dict[Connection, Worker] = {}
         self._groups: dict[str, list[int]] = {}
         self._started = 0
+        self._hearing = PollSelector()  # of which no worker inherits a descriptor
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool | None:
@@ -201,6 +220,7 @@ class ForkedWorkers:
                     other.close()
                 WorkerProcess(session, f"worker{self._started}", told, place).run(self._take_groups(first))
         self._workers[heard] = Worker(pid, place)
+        self._hearing.register(heard, EVENT_READ)
         told.close()
         signal.pthread_sigmask(signal.SIG_UNBLOCK, INTERRUPT)
 
@@ -218,15 +238,18 @@ class ForkedWorkers:
         """Pass on what the workers tell, until each has ended."""
         hook = session.config.hook
         while self._workers:
-            for heard in wait([*self._workers]):
-                assert isinstance(heard, Connection)
+            for key, _ in self._hearing.select():
+                heard: Any = key.fileobj
                 try:
                     nodeid, location, reports = heard.recv()
                 except EOFError:
                     self._bury(session, heard)
                     continue
                 for packed in reports:
-                    report = hook.pytest_report_from_serializable(config=session.config, data=packed)
+                    if isinstance(packed, Plain):
+                        report = packed.report_of(nodeid, location)
+                    else:
+                        report = hook.pytest_report_from_serializable(config=session.config, data=packed)
                     hook.pytest_runtest_logreport(report=report)
                 hook.pytest_runtest_logfinish(nodeid=nodeid, location=location)
                 if session.shouldfail:
@@ -235,6 +258,7 @@ class ForkedWorkers:
     def _bury(self, session: pytest.Session, heard: Connection) -> None:
         """A worker has ended. Died it has with a test that fails so, and another one goes on behind that."""
         worker = self._workers.pop(heard)
+        self._hearing.unregister(heard)
         heard.close()
         _, status = os.waitpid(worker.pid, 0)
         if not status:
@@ -258,32 +282,3 @@ class ForkedWorkers:
                 os.kill(worker.pid, signal.SIGINT)
         for worker in self._workers.values():
             os.waitpid(worker.pid, 0)
-
-
-class OneCompiler:
-    """Lets one worker compile loops at a time: the others then find on disk what they, too, need. In a fresh clone all of them
-    compiled the same for seconds, and at once. One loop may be compiled within another."""
-
-    def __init__(self, file: Path) -> None:
-        self._file, self._threads, self._depth = file, RLock(), 0
-
-    def take_turns(self, dispatcher: Any) -> None:
-        """dispatcher: numba's class of that name, which looks on disk before it compiles."""
-        compile_now = dispatcher.compile
-
-        def compile_in_turn(loop: Any, types: Any) -> Any:
-            with self._turn():
-                return compile_now(loop, types)
-
-        dispatcher.compile = compile_in_turn
-
-    @contextmanager
-    def _turn(self) -> Iterator[None]:
-        with self._threads, self._file.open("rb") as lock:
-            if not self._depth:  # else this thread has it
-                fcntl.flock(lock, fcntl.LOCK_EX)
-            self._depth += 1
-            try:
-                yield
-            finally:
-                self._depth -= 1

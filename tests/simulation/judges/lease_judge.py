@@ -94,6 +94,8 @@ class LeaseJudge:
         self, frame: Frame, control: int | None, beat: float | None, now_s: float, *, is_taken: bool
     ) -> None:
         """Behind a death the holder's frames begin nothing as they stood, whichever comes first."""
+        if not self._left:
+            return
         left = self._left.get(frame) if beat is not None else None
         if frame[0] in {host for host, *_ in self._left} and (control == 0 or (beat is not None and beat != left)):
             self._left.clear()

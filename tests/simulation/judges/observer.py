@@ -49,6 +49,7 @@ UNHEARD_S = 0.1  # so late a write may be taken whose master has hung up, or fal
 SENTENCE = re.compile(
     rb"(ST|US|OL),(?:GS|NT),([ +\-.0-9]{8})(kg| N|lb| g)\r\n"
 )  # of the demo rig's cell; OL: beyond its range
+SETTING, CUT_SETTING = re.compile(rb"()SET (\d+)"), re.compile(rb"(.*)SET (\d+)")
 UNITS_N = {b"kg": 9.80665, b" N": 1.0, b" g": 9.80665e-3, b"lb": 4.4482216152605}
 OVER_READINGS = 3  # in a row are over-force
 ZERO_N = 8.0  # so far may the zero have been moved by somebody who has tared
@@ -100,7 +101,7 @@ class Observer:
         *lines, self._line = (self._line + chunk).split(b"\r\n")
         for heard in lines:
             line = self._without_dropped(heard)
-            if found := re.fullmatch(rb"(.*)SET (\d+)", line) if self._is_cut else re.fullmatch(rb"()SET (\d+)", line):
+            if found := (CUT_SETTING if self._is_cut else SETTING).fullmatch(line):
                 if line == heard:
                     self._note_setting(int(found[2]) * COUNT_V, now_s)
             elif line != b"MON" and not self._is_cut:
