@@ -1,5 +1,5 @@
-"""Did the last run end cleanly? A file that exists only while a gateway runs. Beside it stands what a clean end leaves to the
-next start, whose guardian is another one.
+"""Did the last run end cleanly? A file that exists only while a gateway runs. Beside it stands what its end leaves to the
+next start, whose guardian is another one; by a power cut it leaves nothing.
 
 A disk that does not take it is no reason not to control: then the next start does not know of this run.
 """
@@ -36,11 +36,21 @@ class CleanShutdownMarker:
 
     @property
     def left(self) -> dict[str, Any]:
-        """Facts that the last run that ended cleanly has left; empty where there are none, or no object."""
+        """Facts that the last run has left at its end; empty where there are none, or no object."""
         try:
             return read_object(self._left)
         except (OSError, ValueError):
             return {}
+
+    def leave(self, left: dict[str, Any]) -> None:
+        """Store facts for the next start where the file is still there: control did not come to its own end, but its guardian
+        has. Nothing where it was cleared, for what is left then is control's."""
+        with (
+            contextlib.suppress(OSError),
+            closing_descriptor(os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)) as directory,
+        ):
+            if left and self._path.exists():
+                replace_durably(directory, LEFT, json.dumps(left).encode(), mode=0o600)
 
     def clear(self, left: dict[str, Any] | None = None) -> None:
         """Remove the file: this run ended cleanly. left: for the next start; where that is not stored the file stays, for the

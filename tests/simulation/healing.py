@@ -14,8 +14,9 @@ HELD_N = 12.0
 HEAL_S, SWITCH_S = 2.0, 0.3
 """SWITCH_S: for which a valve that goes to the other side keeps the force waiting."""
 IN_BAND_N = 1.0
-RATE_S, LEAST_RATE = 0.6, 0.6
-"""For so long the devices' answers are counted, and of so many as at first there must be so many at least."""
+RATE_S, LEAST_RATE = 0.6, 0.45
+"""For so long the devices' answers are counted, and of so many as at first there must be so many at least: a cell that is
+asked at its own rate waits for a tick where its answer comes just before it is due, half of the time then (seed 226620)."""
 ANSWER_S = 0.02
 LOOKING_S = 3.0
 """What is plugged in is looked for, and a guardian started again, every 2 s at the most."""
@@ -23,8 +24,8 @@ FIRST_WORDS_S = 3.5
 """So long a start waits for the first words of a device that obeys nothing until a person resets; then it serves."""
 MOST_OFF_N = 0.5
 """By how much a healthy cell may read another force at rest than at first, until the zero is taken anew."""
-TARES, TARE_S, LIFT_S = 5, 0.3, 1.3
-"""Two readings that differ too much refuse it as long as both are looked at."""
+TARES, TARE_S, LIFT_S, LOOKED_AT = 5, 0.3, 1.3, 21
+"""Two readings that differ too much refuse it as long as both are looked at, 20 at once: of a slow cell that is longer."""
 
 
 def heal(simulation: "Simulation") -> None:
@@ -58,14 +59,15 @@ def heal(simulation: "Simulation") -> None:
 def _tare(simulation: "Simulation") -> None:
     """Where the safe voltage presses, the tool is lifted for it."""
     is_lifted = simulation.observer.bounds.safe_v > 0.0
+    lift_s = max(LIFT_S, LOOKED_AT * (simulation.around.cell_s or 0.0))
     if is_lifted:
         simulation.around.set_fault("no-contact", on=True)
-        simulation._run_for(LIFT_S)
+        simulation._run_for(lift_s)
     simulation.masters["healer"].tare()
     simulation._run_for(TARE_S)
     if is_lifted:
         simulation.around.set_fault("no-contact", on=False)
-        simulation._run_for(LIFT_S)
+        simulation._run_for(lift_s)
 
 
 def count_answers(simulation: "Simulation") -> dict[str, int]:

@@ -38,7 +38,7 @@ class Surroundings:
     _unwatched_s: float | None = None
 
     def __init__(self, rig: Rig, outside: VirtualLoop, observer: Observer, cell_s: float | None) -> None:
-        self._rig, self._outside, self._observer, self._cell_s = rig, outside, observer, cell_s
+        self._rig, self._outside, self._observer, self.cell_s = rig, outside, observer, cell_s
         self._pulled = set[str]()  # since the last look, and perhaps pushed again
         self.world = SimulatedRig(
             rig,
@@ -200,10 +200,10 @@ class Surroundings:
         CABLES["valve"].send_to_host(self.world.on_valve_bytes(chunk, now_s))
 
     def _stream(self) -> None:
-        assert self._cell_s
+        assert self.cell_s
         if CABLES["load_cell"].backlog_s < 0.01:
             self.world.stream(self._outside.clock.now_s)
-        self._outside.call_later(self.cell_pace * self._cell_s, self._stream)
+        self._outside.call_later(self.cell_pace * self.cell_s, self._stream)
 
 
 def _since(lost_s: float | None, is_lost: bool, now_s: float) -> float | None:

@@ -1,12 +1,12 @@
-"""What a control process leaves, through the guardian, to the one that is started when it dies, and a gateway that has ended
-cleanly, in its state directory, to the next one.
+"""What a control process leaves, through the guardian, to the one that is started when it dies, and a gateway that ends, in
+its state directory, to the next one.
 
 By itself a start knows only what it finds. By this:
 - the recording goes on;
 - a TLS face whose port is any free one (0) keeps it;
 - a master that keeps the bit of a run at 1 begins no other run by that, and one that keeps enable at 1 over a latched fault, or
   with a heartbeat with which it was lost, or which it has written before, presses nothing, although fault and loss are
-  forgotten (this alone behind a clean end, too: a service is restarted by who wonders why the machine stands);
+  forgotten (this alone behind the gateway's own end, too: a service is restarted by who wonders why the machine stands);
 - a calibration or a plant that is another one now (their files are gone, say) is told, and so is a tare that is forgotten,
   until the next one: behind a second death it is missing as well.
 """
@@ -27,8 +27,8 @@ _HELD: Final[Mapping[str, Callable[[Any], bool]]] = {
 
 
 def left_of(kept: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what of this counts behind a clean end, too: by which bits and heartbeats nothing begins. What is no such fact,
-    whatever has become of its file, is left out."""
+    """Return what of this counts behind the gateway's own end, too: by which bits and heartbeats nothing begins. What is no
+    such fact, whatever has become of its file, is left out."""
     facts = {name: kept[name] for name in _HELD if isinstance(kept.get(name), dict) and kept[name]}
     return {name: held for name, held in facts.items() if all(map(_HELD[name], held.values()))}
 

@@ -27,6 +27,7 @@ from gateway.processes.scheduling import priority
 from gateway.processes.state_directory import put_back
 from gateway.processes.state_lock import hold_state_lock
 from gateway.processes.systemd.service_manager import ServiceManager, service_manager
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.heartbeat_memory import HeartbeatMemory
 from gateway.service.supervisor import guardian_sentences as words
 from gateway.service.supervisor.child_process import Child, create_shared_memory, describe_exit, reap_orphans
@@ -321,10 +322,9 @@ class Guardian:
             self.control.process.end()
         self.others.end()
         self._forget_leaving()
-        for descriptor, _ in self.listeners.values():
-            os.close(descriptor)
         if self.control.memory:
             self.control.memory.close()
-        for memory in (self.ring, self.beat):
-            if memory is not None:
-                os.close(memory)
+        shared = [memory for memory in (self.ring, self.beat) if memory is not None]
+        for descriptor in (*shared, *(listening for listening, _ in self.listeners.values())):
+            os.close(descriptor)
+        CleanShutdownMarker(self.state).leave(self.control.kept)  # last: a disk may hang

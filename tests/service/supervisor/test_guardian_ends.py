@@ -5,6 +5,7 @@ import pytest
 from gateway.processes import exit_codes, message_link
 from gateway.processes.exit_cause import EndCause, Ending
 from gateway.processes.scheduling.scheduler_counters import ProcessorTime
+from gateway.service.clean_shutdown_marker import CleanShutdownMarker
 from gateway.service.supervisor.safe_line import SafeLine
 from tests.service.supervisor.guarded import (
     PTYS,
@@ -231,6 +232,29 @@ def test_whatever_ends_the_guardian_the_safe_voltage_goes_first(scene, port, mon
         one.run()
     one.guardian._close()
     assert port.wrote() == SAFE_FRAME
+
+
+@pytest.mark.parametrize("has_ended_cleanly", [False, True])
+def test_what_control_has_kept_is_left_to_the_next_start_where_it_does_not_end_by_itself(
+    scene, port, has_ended_cleanly
+):
+    """A loop stood still while it was told to stop, and a frame that was lost before pressed behind the next start."""
+    lost = {"lost_beats": {"10.0.0.2": [24]}}
+    one = scene(lives(port))
+    marker = CleanShutdownMarker(one.guardian.state)
+    marker.mark_running()
+    assert_comes_up(one)
+    one.child.say(message_link.KEEP, lost)
+    one.signals.send()
+    if has_ended_cleanly:
+        one.child.say(message_link.SAFE)
+        one.run(steps=3, until=lambda: one.guardian.control.is_safe)
+        marker.clear({"lost_beats": {"10.0.0.2": [25]}})
+        one.child.dies(0)
+    assert one.run() == 0
+    one.guardian._close()
+    assert marker.left == ({"lost_beats": {"10.0.0.2": [25]}} if has_ended_cleanly else lost)
+    assert marker.mark_running() is not has_ended_cleanly
 
 
 @pytest.mark.parametrize("is_late", [False, True], ids=["at-once", "behind-the-look"])

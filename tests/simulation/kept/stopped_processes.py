@@ -155,4 +155,13 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(7.8692, "machine", "power_cut", (0.1, 0.0)),
         ],
     ),
+    (
+        227042,
+        [
+            Event(0.8048, "rival", "take", (45.31,)),
+            Event(3.1633, "rival", "hang"),
+            Event(4.5927, "machine", "terminate", (0.0488, -790712.3246909495)),
+            Event(4.6009, "machine", "stop", (0.5437, 0.0)),
+        ],
+    ),
 ]
