@@ -155,8 +155,9 @@ async def _probe_at(
 
 
 def _listens_s(profiles: Sequence[DeviceProfile], patience_s: float) -> float:
-    """How long until these streams have said enough, and one line that was cut at its beginning."""
-    by_rate_s = [(_ENOUGH + 1) / profile.rate_hz for profile in profiles if profile.stream]
+    """How long until these streams have said enough, and one line that was cut at its beginning; half a line more, for their
+    clocks are not ours."""
+    by_rate_s = [(_ENOUGH + 1.5) / profile.rate_hz for profile in profiles if profile.stream]
     return max(_LISTEN_S, min(_LONGEST_LISTEN_S, max([patience_s, *by_rate_s]))) if by_rate_s else _LISTEN_S
 
 
