@@ -39,8 +39,12 @@ class People:
                 )
         self.scene.disk.note_all()
         for one in self.scene.players:
-            if said and (one is player or deed in (self._hide,)):
+            if said and (one is player or self._holds(path, one)):
                 one.is_touched = one.is_touched or deed not in (self._add, self._hide)
+
+    def _holds(self, path: Path, player: Player) -> bool:
+        """A place of the player's is within this folder."""
+        return any((self.scene.state / name).is_relative_to(path) for name in player.folders)
 
     def undo(self) -> None:
         """Put back what stands where something else was put."""

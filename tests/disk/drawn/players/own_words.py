@@ -197,7 +197,7 @@ class MarkerPlayer(Player):
     """Did the last run end cleanly, and which masters' bits begin nothing: a start knows both, or takes the worse.
 
     left: what the last clean end has left. was_killed: how the life before ended, None where nobody can know; is_marked: it
-    said that it ran, on a disk that took it."""
+    said that it ran, on a disk that took it; is_left: `left` is that of an end that was not clean, but surely stored."""
 
     folders: ClassVar = ("running", "left.json")
 
@@ -205,7 +205,7 @@ class MarkerPlayer(Player):
         super().__init__(scene)
         self.left: dict[str, Any] = {}
         self.was_killed: bool | None = False
-        self.is_marked = True
+        self.is_marked, self.is_left = True, False
         self.number = 0
 
     def begin(self) -> None:
@@ -217,14 +217,24 @@ class MarkerPlayer(Player):
         if not self.disk.refused and not self.is_touched:
             if was_killed is not None and was_unclean is not was_killed:
                 self.complain(f"the run before was {'killed' if was_killed else 'ended'}; told: {was_unclean}")
-            if self.is_marked and not was_unclean and found != self.left:
-                self.complain(f"a clean start knows {found}, {self.left} was left")
+            if self.is_marked and (self.is_left or not was_unclean) and found != self.left:
+                self.complain(f"a start knows {found}, {self.left} was left")
+        self.is_left = False
         self.is_marked = not self.disk.refused and not self.is_touched
         self.was_killed = True if self.is_marked else None
 
     def act(self) -> None:
-        """A clean end, and another start, of the machine say."""
+        """A clean end, or one at which control stands still, and another start, of the machine say."""
         self.number += 1
+        if self.is_marked and self.rng.random() < 0.3:
+            self.disk.refused.clear()
+            left = {"lost_beats": {"10.0.0.1": [self.number]}}
+            self.marker.leave(left)
+            if not self.disk.refused and not self.is_touched:
+                self.left, self.is_left = left, True
+            self.scene.note(f"the guardian has left {self.number}")
+            self.scene.lose_power() if self.rng.random() < 0.5 else self.begin()
+            return
         self.left = {"lost_beats": {"10.0.0.1": [self.number] * 40}} if self.rng.random() < 0.7 else {}
         self.disk.refused.clear()
         was_killed, self.was_killed = self.was_killed, None
