@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from typing import Any
 
 from gateway.devices import output_device
@@ -33,6 +34,7 @@ class Surroundings:
     is_whole = True
     _dark_until_s = 0.0
     _freed_s = -LOOSE_S
+    _spoiled_s = -inf  # when an answer of the output was lost last, but for those that its cable spoiled
     _is_stuck = False
     _back_s = 0.0  # when a line that was lost has brought its first byte
     _unwatched_s: float | None = None
@@ -137,8 +139,9 @@ class Surroundings:
         """A sentence that fits is a sample, or an answer, whoever says it: cell and output are lost from then on."""
         observer, output, cell = self._observer, CABLES["output"], CABLES["load_cell"]
         observer.cell_heard_s = observer.cell_said_s if observer.history.is_plain else cell.heard_s
-        is_noisy = self.world.settings.number("wire.noise") > 0.0
-        observer.answer_spoiled_s = self._outside.clock.now_s if is_noisy else output.spoiled_s
+        if self.world.settings.number("wire.noise") > 0.0 or observer.answers_lost_s is not None:
+            self._spoiled_s = self._outside.clock.now_s  # who answers again has not heard what was asked before
+        observer.answer_spoiled_s = max(self._spoiled_s, output.spoiled_s)
         if observer.cell_lost_s is not None:
             observer.cell_lost_s = max(observer.cell_lost_s, cell.strange_s)
         if observer.answers_lost_s is not None:

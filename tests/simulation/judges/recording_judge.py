@@ -136,7 +136,8 @@ def _judge_laid(
 
 
 def _is_zero_new(history: History, at_s: float, since_s: float) -> bool:
-    return at_s >= history.weighed_s or _is_near(history.tares, at_s + HEARD_S, since_s + HEARD_S)
+    heard_s = at_s + HEARD_S  # who wrote hears of it later
+    return heard_s >= history.weighed_s or _is_near(history.tares, heard_s, since_s + HEARD_S)
 
 
 def _zeros(told_n: float, force_n: float, history: History) -> tuple[float, ...]:

@@ -127,6 +127,8 @@ class BusMaster(Master):
         del self.heard[:-64]
         if pdu[0] in WRITES:
             self._tell(question, True)
+        elif is_strange:  # a refusal may be the second one of what was asked before (seed 256664)
+            self._tell(question, False)
         self._ask_next()
 
 
