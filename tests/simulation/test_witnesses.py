@@ -137,14 +137,18 @@ def test_who_takes_over_asks_for_what_is_pursued(
     assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken
 
 
-@pytest.mark.parametrize(("accepted", "is_broken"), [(3902, False), (3901, True)])
+@pytest.mark.parametrize(
+    ("owner", "writer", "accepted", "is_broken"),
+    [(1, OWNER, 3902, False), (1, OWNER, 3901, True), (2, OWNER, 3902, False), (2, OTHER, 3902, True)],
+)
 def test_what_is_pursued_may_have_become_less_since_the_look_before(
-    observer: Observer, accepted: int, is_broken: bool
+    observer: Observer, owner: int, writer: str, accepted: int, is_broken: bool
 ) -> None:
-    """As seed 250205 drew it: the owner's lease ended on the way to 44.92 N, and another one's heartbeat took over at once."""
+    """As seed 250205 drew it: the owner's lease ended on the way to 44.92 N, and another one's heartbeat took over at once; and
+    as 254383 did: that one had owned before, and been taken from since the look before."""
     witness = StatusWitness(observer, lambda: inf)
-    witness.note_write(OWNER, write_one_pdu(1, 4492), 1.85)
-    look(witness, 1.9, requested=4492, accepted=4492, owner=1)
+    witness.note_write(writer, write_one_pdu(1, 4492), 1.85)
+    look(witness, 1.9, requested=4492, accepted=4492, owner=owner)
     for number in range(1, 5):
         look(witness, 1.9 + 0.1 * number, requested=3902, accepted=accepted, owner=2)
     assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken

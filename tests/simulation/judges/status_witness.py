@@ -47,7 +47,7 @@ class StatusWitness:
         self._requested: deque[tuple[float, int, int, tuple[int, ...]]] = deque()
         self._left: tuple[int, tuple[int, ...]] = (0, ())  # of the look before: what was pursued, and for whom
         self._requested_s = 0.0
-        self._written: deque[tuple[float, float]] = deque()
+        self._written: deque[tuple[float, float, str]] = deque()
         self._beats: deque[tuple[float, float]] = deque()
         self._echoes: deque[tuple[float, int]] = deque()
         self._beat, self._refused_s, self._write_s = 0, inf, 0.0
@@ -75,7 +75,7 @@ class StatusWitness:
         latest."""
         if (control := control_of(pdu)) is not None:
             self._commands.append((now_s, host, control))
-        self._written += ((now_s, counts) for counts in setpoints_of(pdu))
+        self._written += ((now_s, counts, host) for counts in setpoints_of(pdu))
         self._write_s = max(self._write_s, now_s)
         if (beat := word_of(pdu, BEAT)) is not None:
             self._beats.append((now_s, beat))
@@ -138,11 +138,18 @@ class StatusWitness:
             self._written.popleft()
         self._requested_s = at_s
         signed = counts - 65536 if counts & UNAVAILABLE else counts
-        left, former = self._left
-        is_known = counts in (0, self._known) or (owner != former and counts in (left, accepted))
-        if not is_known and all(abs(signed - one) > 1.0 for _, one in self._written):
+        is_known = counts in (0, self._known) or self._is_left(counts, accepted, owner)
+        if not is_known and all(abs(signed - one) > 1.0 for _, one, _ in self._written):
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
         self._known, self._left = counts, (accepted, owner)
+
+    def _is_left(self, counts: int, accepted: int, owner: tuple[int, ...]) -> bool:
+        """Decide whether a new owner has asked for what another one's setpoint had come to, at this look or the one before. Who
+        owned before that look as well may have lost and taken it since: then the other one has just written."""
+        left, former = self._left
+        is_new, name = owner != former, str(ip_address(owner[0] << 16 | owner[1]))
+        has_lost = is_new or any(one > counts and host != name for _, one, host in self._written)
+        return (is_new and counts == left) or (has_lost and counts == accepted)
 
     def _judge_owner(self, owner: int, at_s: float) -> None:
         """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables. A run
