@@ -13,7 +13,8 @@ from tests.simulation.judges.observer import FAULT, STATUS_WORDS, Observer
 AFTER_S = 1.5
 """So long after its cause has ended a fault may still begin: the longest bound on silence, and two looks."""
 RISE_S = 3.0
-"""The same of a wrong gain: it is judged over the whole first rise, which may have begun with a disturbed cell."""
+"""The same of a wrong gain or sign: they are judged over the whole first rise, which may have begun with a disturbed cell, or
+behind a contact that has just come back (seed 259310)."""
 REOPENED_S = 3.0
 """So long one may be refused: a port that is back is opened within two seconds."""
 EVER_S = 1e6
@@ -94,7 +95,8 @@ class ReasonJudge:
         before, self._fault = self._fault, words[10] if words[1] == FAULT else 0
         if self._fault in (0, before, MASTER_LOST) or (self._fault == OVER_FORCE and self.has_payload):
             return
-        after_s, reasons = RISE_S if self._fault == GAIN_WRONG else AFTER_S, REASONS.get(self._fault, ())
+        after_s = RISE_S if self._fault in (GAIN_WRONG, SIGN_INVERTED) else AFTER_S
+        reasons = REASONS.get(self._fault, ())
         if self._fault == SIGN_INVERTED and self._observer.bounds.safe_v > 0.0:
             reasons = (
                 *reasons,
