@@ -88,6 +88,14 @@ def test_what_is_known_to_come_from_outside_may_show_and_need_not(
     assert rise.at(cell_n).judged(expected_n) is fault
 
 
+@pytest.mark.parametrize(("cell_n", "kept_n", "fault"), [(-2.4, 9.0, RIGHT), (-2.6, 9.0, SIGN), (-1.6, 1.0, SIGN)])
+def test_what_friction_kept_at_the_last_tare_may_leave_and_is_no_wrong_sign(
+    cell_n: float, kept_n: float, fault: FaultCode
+) -> None:
+    """Signal wires were blamed where the tool came to rest anew at 0.3 V (seed 259310 of the schedules)."""
+    assert Rise().at(cell_n).judged(1.0, kept_n=kept_n) is fault
+
+
 def test_what_friction_kept_when_the_model_was_measured_is_no_wrong_gain() -> None:
     assert Rise().at(8.0).judged(2.0, kept_n=4.0) is RIGHT
     assert Rise().at(9.5).judged(2.0, kept_n=4.0) is GAIN
