@@ -207,7 +207,9 @@ class RiseCheck:
         weight_n = self._weight_at_rest_n or 0.0
         rise_n = self.measured_rise_n + max(0.0, self._weight_n - weight_n)  # in the air a tilt lets the payload pull
         may_leave_n = min(response.kept_n, response.width_n)  # by friction, taken for the zero
-        wrong_sign = expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n) - may_leave_n
+        wrong_sign = (
+            expected_n >= _LEAST_RISE_N and rise_n <= -max(self._threshold_n, _LOWEST_SHARE * expected_n) - may_leave_n
+        )
         self._wrong_sign_s = self._wrong_sign_s + interval_s if wrong_sign else 0.0
         if self._wrong_sign_s >= _LASTING_S:
             return FaultCode.SIGN_INVERTED
