@@ -22,7 +22,7 @@ MOST_STALE = 2
 """Cycles in a row in which a program whose heartbeat moves may be told that it stands still. Not counted is one in which
 another host has switched the output off, or anybody has ended a run, between its heartbeat and its start: the frames of a
 program that has just hung are the same, and nothing of that one begins behind a stop. There safety wins."""
-DOWN_S = 2.0
+DOWN_S = 4.1  # of any force, of a ladder say (wide seed 68897)
 
 
 class Laws:
