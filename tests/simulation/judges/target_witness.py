@@ -5,7 +5,7 @@ so long is told as that, and `in_band` is what the readings say. No code of the 
 import struct
 
 from tests.simulation.judges.observer import STATUS_WORDS, Observer
-from tests.simulation.masters.spelling import word_of
+from tests.simulation.masters.spelling import ENABLE, control_of, word_of
 
 IN_BAND, SWITCHING, UNREACHABLE = 1 << 3, 1 << 9, 1 << 1
 COUNT_N = 0.01
@@ -33,9 +33,10 @@ class TargetWitness:
         self._observer = observer
 
     def note_write(self, writer: str, pdu: bytes, at_s: float) -> None:
-        """Note whose write was taken at at_s: two masters who take the force from each other each have theirs between two
-        looks; and what is in another band is not judged by the one before."""
-        if writer != self._writer:
+        """Note whose write was taken at at_s: two masters who take the force from each other, or let it go, each have theirs
+        between two looks; and what is in another band is not judged by the one before."""
+        control = control_of(pdu)
+        if writer != self._writer or (control is not None and not control & ENABLE):
             self._writer, self._held = writer, NOTHING
         if any(
             word_of(pdu, place) not in (None, word) for place, word in zip((BAND, BAND_TIME), self._band, strict=True)
