@@ -118,12 +118,15 @@ def test_a_target_that_is_missed_without_a_word_and_a_false_band_are_seen(
     assert {line.partition(" at ")[0] for line in observer.broken} == ({"target"} if is_seen else set())
 
 
-@pytest.mark.parametrize(("masters", "is_seen"), [(1, True), (2, False)])
-def test_two_masters_who_take_a_target_from_each_other_have_none(masters: int, is_seen: bool) -> None:
+@pytest.mark.parametrize(("masters", "address", "is_seen"), [(1, 1, True), (2, 1, False), (1, 0, False)])
+def test_two_masters_who_take_a_target_from_each_other_or_let_it_go_have_none(
+    masters: int, address: int, is_seen: bool
+) -> None:
+    """The word is one without enable; of a master on a bus nobody knows its name."""
     observer = Observer(BOUNDS)
     witness = TargetWitness(observer)
     for number in range(9):
-        witness.note_write(f"10.0.0.{1 + number % masters}", write_pdu(1, 2000), 1000.0 + 0.5 * number)
+        witness.note_write(f"10.0.0.{1 + number % masters}", write_pdu(address, 2000), 1000.0 + 0.5 * number)
         look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
     assert bool(observer.broken) is is_seen
 
