@@ -67,6 +67,31 @@ def test_behind_a_0_a_refused_frame_that_comes_again_within_a_cycle_is_of_a_prog
     assert not held.repeats(HOST, frame(7), 102.9)
 
 
+@pytest.mark.parametrize("is_refused", [True, False])
+def test_beside_a_program_that_connects_anew_for_each_frame_the_last_one_of_another_is_known(is_refused: bool) -> None:
+    """It was forgotten for the connections of the other one, and behind that one's 0 it began (seed 59728). Where their frames
+    were taken all connections were kept, so that each write looked at tens of thousands of them."""
+    held = refused()
+    for k in range(20 * defaults.MOST_FRAMES):
+        anew = StartFrame((HOST, HOST, 50000 + k, 1, 8), (1, bytes(8)), 7)
+        if is_refused:
+            held.note_refused(HOST, anew, standing=7, now_s=100.0)
+        else:
+            assert held.repeats(HOST, anew, 100.0)
+        assert len(held._refused[HOST, False].sent) <= defaults.MOST_FRAMES
+    held.let_go(HOST, 100.0)
+    assert held.repeats(HOST, frame(7), 100.7)
+
+
+def test_of_too_many_frames_of_a_host_the_one_is_forgotten_that_has_not_come_for_longest() -> None:
+    held = refused()
+    others = [StartFrame((*CHANNEL[:3], k, 2), (k, b"\0\x09"), 7) for k in range(1, 1 + defaults.MOST_FRAMES)]
+    for sent in (*others[:-1], frame(7), others[-1]):
+        held.note_refused(HOST, sent, standing=7, now_s=100.0)
+    held.let_go(HOST, 100.0)
+    assert held.repeats(HOST, frame(7), 100.7) and not held.repeats(HOST, others[0], 100.7)
+
+
 def test_who_was_lost_in_the_process_before_begins_behind_another_heartbeat_and_not_by_the_one_of_then() -> None:
     held = HeldEnables()
     held.restore({}, {HOST: [7]}, 100.0)

@@ -150,13 +150,12 @@ class HeldEnables:
             frame = frame._replace(takes=frame.takes or before.frame.takes)  # one of its frames does
             if before.beats:
                 self.note_lost(host, before.heartbeat)
-        beats = frame.heartbeat is not None
         self.note_refused_beat(host, frame)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
         moves = self.frames.moves_so_far
-        few = dict(list(_sent_alike(before.sent if before else {}, frame, moves).items())[-defaults.MOST_FRAMES :])
-        beats = beats or bool(before and before.beats)
-        keep_latest(self._refused, (host, frame.tares), _Refused(frame, known, beats, now_s, few, moves))
+        sent = _sent_alike(before.sent if before else {}, frame, moves)
+        beats = frame.heartbeat is not None or bool(before and before.beats)
+        keep_latest(self._refused, (host, frame.tares), _Refused(frame, known, beats, now_s, sent, moves))
         if frame.tares and self.has_beaten(host):
             self.note_lost(host, known)
 
@@ -319,7 +318,13 @@ class HeldEnables:
 
 
 def _sent_alike(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
-    """Return what the frames of a host have sent, with this one: by whichever connection of a pool the same bytes came. Tares
-    of two programs are the same bytes, too, and each of them goes on: there a connection stands for its program."""
+    """Return what the latest frames of a host have sent, with this one: by whichever connection of a pool the same bytes came
+    (tares of two programs are alike, too: there a connection stands for its program). Of too many the oldest of the same bytes
+    goes first: beside a program that connects anew for each frame another one's last frame is not forgotten."""
     alike = [channel for channel, other in sent.items() if other.data == frame.data and not frame.tares]
-    return {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}
+    known = {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}
+    known[frame.channel] = known.pop(frame.channel)  # the latest is the last
+    if len(known) > defaults.MOST_FRAMES:
+        each = [other.data for other in known.values()]
+        del known[next((channel for channel, other in known.items() if each.count(other.data) > 1), next(iter(known)))]
+    return known

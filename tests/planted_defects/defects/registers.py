@@ -157,6 +157,8 @@ DEFECTS = (
     Defect("behind such a 0 one of its frames alone is known", "registers/writes/held_starts.py",
            "_sent_alike(before.sent if before else {}, frame", "_sent_alike({}, frame",
            ("registers/test_held_starts.py",)),
+    Defect("a program that connects anew for each frame has another one's forgotten", "registers/writes/held_starts.py",
+           "if each.count(other.data) > 1)", "if not each)", ("registers/test_held_starts.py",)),
     Defect("a hung program that connects for each frame beats", "registers/writes/frame_beats.py",
            "return channel != self._newest and _latest_alike(self._last, channel) == heartbeat", "return False",
            ("service/running_rig/masters/test_frames_side_by_side.py",)),
