@@ -32,7 +32,7 @@ def heal(simulation: "Simulation") -> None:
     """Repair everything, reset, hold a force, and note where it does not come."""
     _repair(simulation)
     simulation._run_for(LOOKING_S)
-    until_s = simulation.clock.now_s + FIRST_WORDS_S
+    until_s = simulation.clock.now_s + LOOKING_S + FIRST_WORDS_S  # it may have been stopped amid a start
     while not simulation.service.is_serving and simulation.clock.now_s < until_s:
         simulation._run_for(0.1)
     healer = simulation.masters["healer"]
