@@ -137,7 +137,7 @@ def test_a_device_that_says_no_in_the_profile_s_own_words_is_there(name: str, sh
     """Of a module whose firmware has no `$01M` it was said that no profile understood its `?01`."""
     profile = replace(load_device(name), refusals=Refusals(unknown=shown))
     with behind_ptys(Refusing(profile, f"{shown}{profile.terminator}".encode())) as (path,):
-        report = asyncio.run(port_probe.probe_port(path, [profile], ()))
+        report = asyncio.run(port_probe.probe_port(path, [profile], (), patience_s=0.4))
     (said,) = tell_report(report)
     assert said.endswith(
         f"no known device answered; one says no in the words of {name} at {profile.serial}, '{shown}': it is there, and has no "
