@@ -202,7 +202,7 @@ class Simulation:
     def _happen_then(self, event: Event, events: Iterator[Event]) -> None:
         happen(self, event)
         if event.what == "terminate":
-            self._is_ending = True
+            self.lease.note_ending()
             self.reasons.note(MACHINE, max(self.clock.now_s, self.service.thaws_s) + DOWN_S)
         self._happen_next(events)
 
@@ -231,11 +231,6 @@ class Simulation:
 
     def _note_start(self, host: str, pdu: bytes, is_taken: bool) -> None:
         self.lease.note_start(pdu, self.clock.now_s, is_taken=is_taken, host=host)
-        if (
-            self._is_ending and not is_taken and host == self.lease.holder
-        ):  # on the way to 0 who is refused is there all the same
-            self.lease.renew(self.clock.now_s)
-            self.observer.write_s = self.clock.now_s
 
     def _note_weight(self, pdu: bytes) -> None:
         self.explained.note_change(self.clock.now_s)
@@ -271,7 +266,6 @@ class Simulation:
         return self.clock.now_s if is_answered else max(self.clock.now_s, self.service.thaws_s)
 
     def _on_death(self) -> None:
-        self._is_ending = False
         self.status.forget_owner()
         self.lease.forget(self.clock.now_s, is_all=not self.service.is_guarded)
         self.target.forget()
@@ -287,7 +281,7 @@ class Simulation:
         if self.observer.control_lost_s is None:
             self.observer.control_lost_s = max(self.clock.now_s, self.service.thaws_s)
 
-    _was_watched = _has_set_bits = _is_ending = False
+    _was_watched = _has_set_bits = False
 
     def _follow_person(self, is_watched: bool) -> None:
         """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""

@@ -124,17 +124,23 @@ def test_a_setpoint_that_nobody_has_written_is_seen(observer: Observer) -> None:
 
 
 @pytest.mark.parametrize(("owner", "requested", "is_broken"), [(2, 4000, False), (1, 4000, True), (2, 4001, True)])
+@pytest.mark.parametrize("is_lost", [False, True])
 def test_who_takes_over_asks_for_what_is_pursued(
-    observer: Observer, owner: int, requested: int, is_broken: bool
+    observer: Observer, owner: int, requested: int, is_broken: bool, is_lost: bool
 ) -> None:
-    """As seed 75077 drew it: a calibration lowered 54.42 N to 40, and somebody else took over by bit 3 alone."""
+    """As seed 75077 drew it: a calibration lowered 54.42 N to 40, and somebody else took over by bit 3 alone; and as 236005
+    did: that one's lease had ended, and somebody, or that one, enabled what stood."""
     witness = StatusWitness(observer, lambda: inf)
     witness.note_write(OWNER, write_one_pdu(1, 5442), 1.85)
     for number in range(5):
         look(witness, 1.9 + 0.1 * number, requested=5442, accepted=4000, owner=1)
-    for number in range(5, 10):
-        look(witness, 1.9 + 0.1 * number, requested=requested, accepted=4000, owner=owner)
-    assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * is_broken
+    if is_lost:
+        look(witness, 2.4, requested=5442)
+    for number in range(6, 11):
+        look(witness, 1.9 + 0.1 * number, requested=requested, accepted=0 if is_lost else 4000, owner=owner)
+    assert [line.partition(" at ")[0] for line in observer.broken if "requested" in line] == ["I7"] * (
+        is_broken and (requested, is_lost) != (4000, True)
+    )
 
 
 @pytest.mark.parametrize(

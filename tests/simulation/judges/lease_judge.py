@@ -5,7 +5,7 @@ gateway is used here."""
 from math import inf, isnan, nan
 
 from tests.simulation.judges.observer import DOWN_S, RUN_BITS, Observer
-from tests.simulation.masters.spelling import BEAT, ENABLE, control_of, word_of, written_address
+from tests.simulation.masters.spelling import BEAT, BITS, ENABLE, control_of, word_of, written_address
 from tests.simulation.masters.tcp_master import TAKE
 
 REPEATED_S = 2.0
@@ -24,7 +24,7 @@ def frame_of(host: str, pdu: bytes) -> Frame:
 
 class LeaseJudge:
     """Told of each write of a master: in its order, before the observer is. holder: whose write was the last that left enable
-    at 1."""
+    at 1, or may have by a single bit."""
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
@@ -44,6 +44,9 @@ class LeaseJudge:
         self._refused: dict[str, tuple[bytes, float]] = {}
         """Of each master the start, its heartbeat in it, that was refused last, and when."""
         self.holder = ""
+        self._is_ending = False
+        self._turned_away: tuple[str, float] = "", -inf
+        """Whose request was refused last, and when."""
         self._left: dict[Frame, float] = {}
         """What the frames of the holder brought when control died; nothing once any of them has brought another heartbeat."""
 
@@ -65,7 +68,7 @@ class LeaseJudge:
             self._took.add(host)
         if control is not None:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
-            self.holder = host if self._is_enabled else ""
+            self.holder = host if self._is_enabled or (is_answered and control == BITS) else ""
         if beat is not None:
             self._first_s.setdefault(frame, now_s)
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
@@ -75,6 +78,9 @@ class LeaseJudge:
         was, and none of its master's other frames has brought another heartbeat."""
         control, beat, frame = control_of(pdu), word_of(pdu, BEAT), frame_of(host, pdu)
         self._judge_left(frame, control, beat, now_s, is_taken=is_taken)
+        if not is_taken:
+            self._turned_away = host, now_s
+            self._renew_at_end()
         if beat is not None and self._shown.get(frame) != beat:
             self._shown[frame] = beat
             if self._refused.get(host, (pdu, 0.0))[0] != pdu:
@@ -104,6 +110,17 @@ class LeaseJudge:
         if self._observer.disabled_s is not None and self._observer.bounds.lease_s < inf:
             self._observer.complain("I7 left frame", f"{frame[0]} began by a frame of before the death", now_s)
 
+    def note_ending(self) -> None:
+        """The gateway is told to stop: on the way to 0 who is refused, or was just before, is there all the same."""
+        self._is_ending = True
+        self._renew_at_end()
+
+    def _renew_at_end(self) -> None:
+        host, refused_s = self._turned_away
+        if self._is_ending and host == self.holder:
+            self.renew(refused_s)
+            self._observer.write_s = max(self._observer.write_s, refused_s)
+
     def forget(self, died_s: float, *, is_all: bool = False) -> None:
         """Another process does not know what was refused once, nor what each frame brought, but for those of the holder that
         had come before the last tick, which tells of them; is_all: not of those either, for the guardian is another one."""
@@ -114,6 +131,7 @@ class LeaseJudge:
             if frame[0] == self.holder and self._first_s[frame] < told_s
         }
         self._left = {} if is_all else left or self._left
+        self._is_ending, self._turned_away = False, ("", -inf)
         self._refused.clear()
         self._brought.clear()
         self._first_s.clear()

@@ -46,6 +46,7 @@ class StatusWitness:
         self._last_control = 0
         self._requested: deque[tuple[float, int, int, tuple[int, ...]]] = deque()
         self._left: tuple[int, tuple[int, ...]] = (0, ())  # of the look before: what was pursued, and for whom
+        self._lowered = 0  # what a calibration has made of a setpoint, which it stays for whoever enables it then
         self._requested_s = 0.0
         self._written: deque[tuple[float, float, str]] = deque()
         self._beats: deque[tuple[float, float]] = deque()
@@ -142,14 +143,17 @@ class StatusWitness:
         if not is_known and all(abs(signed - one) > 1.0 for _, one, _ in self._written):
             self._observer.complain("I7", f"{0.01 * signed:.2f} N are requested, which nobody has written", at_s)
         self._known, self._left = counts, (accepted, owner)
+        if 0 < accepted < counts:
+            self._lowered = accepted
 
     def _is_left(self, counts: int, accepted: int, owner: tuple[int, ...]) -> bool:
-        """Decide whether a new owner has asked for what another one's setpoint had come to, at this look or the one before. Who
-        owned before that look as well may have lost and taken it since: then the other one has just written."""
+        """Decide whether a new owner has asked for what another one's setpoint had come to, at this look or the one before, or
+        for what a calibration had made of it. Who owned before that look as well may have lost and taken it since: then the
+        other one has just written."""
         left, former = self._left
         is_new, name = owner != former, str(ip_address(owner[0] << 16 | owner[1]))
         has_lost = is_new or any(one > counts and host != name for _, one, host in self._written)
-        return (is_new and counts == left) or (has_lost and counts == accepted)
+        return (is_new and counts in (left, self._lowered)) or (has_lost and counts == accepted)
 
     def _judge_owner(self, owner: int, at_s: float) -> None:
         """Where one owns the setpoint before and after, and nobody has taken over or let go between, nobody else enables. A run

@@ -9,7 +9,7 @@ from tests.simulation.draws.behaviours import draw_refused
 from tests.simulation.draws.event import Event
 from tests.simulation.judges.lease_judge import LeaseJudge
 from tests.simulation.judges.observer import Bounds, Observer
-from tests.simulation.masters.spelling import write_one_pdu, write_pdu
+from tests.simulation.masters.spelling import coil_pdu, write_one_pdu, write_pdu
 from tests.simulation.schedule import run_schedule
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.05, output_timeout_s=0.2)
@@ -102,3 +102,19 @@ def test_who_begins_by_a_frame_of_before_a_death_is_seen(
     for pdu in (later, FRAME):
         judge.note_start(pdu, 1.5, is_taken=pdu == FRAME, host="10.0.0.1")
     assert bool(observer.broken) is (is_seen and not is_all and died_s == 1.2)
+
+
+@pytest.mark.parametrize(("refused_s", "host", "is_seen"), [(1.14, "10.0.0.1", False), (1.14, "10.0.0.2", True)])
+def test_who_is_refused_just_before_the_gateway_is_told_to_stop_is_there(
+    refused_s: float, host: str, is_seen: bool
+) -> None:
+    """As seed 261928 drew it, whose master had enabled by a coil."""
+    observer = Observer(replace(BOUNDS, lease_s=0.2))
+    judge = LeaseJudge(observer)
+    observer.hear(b"SET 0\r\nSET 300\r\n", 1.0)
+    observer.note_accepted(1, 1.0)
+    judge.note_write(coil_pdu(0, on=True), 1.0, is_answered=True, host="10.0.0.1")
+    judge.note_start(write_pdu(0, 17), refused_s, is_taken=False, host=host)
+    judge.note_ending()
+    judge.look(1.38)
+    assert any(told.startswith("I3") for told in observer.broken) is is_seen
