@@ -252,7 +252,9 @@ class Simulation:
     def _on_write(self, control: int | None, is_answered: bool) -> None:
         if control == DISABLED_BY_BIT:  # which ends no run; a reset may be among the other bits
             control = BITS if self.observer.is_run else RESET
-        if control is not None and control & (ENABLE | RUN_BIT | SELF_TEST) and control > 0 and is_answered:
+        was_enabled = self._begun_enabled if self._was_watched else self.observer.disabled_s is None
+        excluded = RUN_BIT | SELF_TEST | (0 if was_enabled else ENABLE)
+        if control is not None and control & excluded and control > 0 and is_answered:
             self.person.lose()  # a run that was asked for at the machine excludes that
             self._was_watched = False
         self._has_set_bits |= control == BITS and is_answered
@@ -281,12 +283,14 @@ class Simulation:
         if self.observer.control_lost_s is None:
             self.observer.control_lost_s = max(self.clock.now_s, self.service.thaws_s)
 
-    _was_watched = _has_set_bits = False
+    _was_watched = _has_set_bits = _begun_enabled = False
 
     def _follow_person(self, is_watched: bool) -> None:
         """A run that somebody has started at the machine presses without a master, as long as that person looks at it."""
         self._has_set_bits &= self._was_watched
         if is_watched:
+            if not self._was_watched:  # by a master that holds 0 N, and writes its 1 on
+                self._begun_enabled = self.observer.disabled_s is None
             self.observer.note_accepted(RUN_BIT, self.clock.now_s)
         elif self._was_watched and self.observer.is_run:
             self.observer.note_accepted(0, self.clock.now_s)

@@ -86,4 +86,18 @@ KEPT: list[tuple[int, list[Event]]] = [
             ),
         ],
     ),
+    (
+        263366,
+        [
+            Event(7.0382, "worker", "take", (0.0,)),
+            Event(
+                7.3513,
+                "person",
+                "say",
+                data=b'{"do": "calibrate", "plan": {"v_max_v": 1.5, "step_v": 0.5, "groups": 1, "minor_points": 0, '
+                b'"response_steps": 0}, "name": "60"}',
+            ),
+            Event(7.4175, "worker", "hang"),
+        ],
+    ),
 ]
