@@ -65,6 +65,7 @@ def keep_no_parsed_documents(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def simulation(tmp_path: Path) -> Iterator[Simulation]:
+    gc.freeze()  # what the tests before have left is not walked through at each measurement
     with simulated_edges(SimulatedFit):
         simulation = Simulation(SEED, tmp_path)
         with simulation.clock.as_the_kernels():

@@ -52,6 +52,7 @@ COUNTS: dict[str, tuple[list[type[Player]], int]] = {
 def test_what_was_said_to_be_stored_is_there_and_all_heals_with_the_disk(
     fast_folder: Path, which: str, budget: int
 ) -> None:
+    gc.freeze()  # what the tests before have left is not walked through
     kinds, count = COUNTS[which]
     broken, opened = [], _descriptors()
     for seed in range(count * budget):
