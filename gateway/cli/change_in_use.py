@@ -9,6 +9,7 @@ from typing import Any, Final
 from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError, NoAnswerError, disk_hangs
+from gateway.processes import exit_codes
 from gateway.processes.state_lock import hold_state_lock
 
 _PATIENCE_S: Final = defaults.COMMIT_PATIENCE_S
@@ -29,7 +30,11 @@ def ask_until_done(directory: Path, verb: str, request: dict[str, Any]) -> dict[
             answer = ask(directory, {"do": verb})
     except CliError as error:
         if not (is_asked or isinstance(error, NoAnswerError)):
-            raise
+            if error.exit_code != exit_codes.DEVICE:
+                raise
+            # whoever holds the lock need not be a gateway, and one that starts has no socket yet
+            at_it = f"a gateway is just starting on {directory}, or another command is changing it: then try again"
+            raise CliError(f"{error} Or {at_it}", error.exit_code) from None
         unknown = f"it may make the change all the same: force-gateway {verb} list shows what is in use"
         raise NoAnswerError(f"{error}; {unknown}", error.exit_code) from None
     return answer

@@ -88,7 +88,17 @@ def _from_system(error: OSError) -> CliError:
             f"E105 {words}: this user may not; take another place, or chown it (force-gateway explain E105)",
             exit_codes.PERMISSION,
         )
+    if error.errno == errno.ENOENT and not _has_working_directory():
+        words += ": the directory that you are in has been deleted, or made anew: cd to one that is there"
     return CliError(f"E106 {words}")
+
+
+def _has_working_directory() -> bool:
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return False
+    return True
 
 
 def _is_a(error: Exception, module: str, name: str) -> bool:

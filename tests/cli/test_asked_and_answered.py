@@ -74,9 +74,18 @@ def test_a_gateway_that_is_gone_while_it_changes_may_have_made_the_change(monkey
     with pytest.raises(NoAnswerError, match=r"E140 .*; it may make .*: force-gateway plant list shows") as caught:
         ask_until_done(Path(), "plant", {"use": 2})
     assert caught.value.exit_code == exit_codes.DEVICE
-    with pytest.raises(CliError, match=r"E140 no gateway answers$") as refused:
+    with pytest.raises(CliError, match=r"E140 no gateway answers Or .*: then try again$") as refused:
         ask_until_done(Path(), "plant", {"use": 2})
     assert not isinstance(refused.value, NoAnswerError), "of what was never asked nothing is done"
+
+
+def test_two_changes_at_once_are_not_told_as_a_gateway_that_is_gone(tmp_path: Path) -> None:
+    """`calibration use` beside `plant use` asked who held the lock, which was no gateway, and was told to start one."""
+    with not_running(tmp_path) as is_first:
+        assert is_first
+        with pytest.raises(CliError, match=r"E140 .*another command is changing it: then try again$") as refused:
+            store_access.change_calibration(tmp_path, "demo", {"use": 1})
+    assert refused.value.exit_code == exit_codes.DEVICE
 
 
 @pytest.mark.parametrize(("said", "told"), [(b"", "no answer"), (b"[]", "no answer"), (b"{", "E140")])

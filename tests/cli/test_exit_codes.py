@@ -35,3 +35,17 @@ def test_an_error_that_no_verb_has_caught_ends_with_its_code(error: Exception, e
 
 def test_what_is_not_there_is_a_fault_of_the_data() -> None:
     assert no_state_directory(Path("/nowhere")).exit_code == no_such_recording(Path("7")).exit_code == 65
+
+
+def test_a_working_directory_that_was_deleted_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`backup cell.tar.gz` there said "E106 No such file or directory", of what it did not say."""
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    monkeypatch.chdir(gone)
+    gone.rmdir()
+    with pytest.raises(FileNotFoundError) as refused:
+        Path("cell.tar.gz").absolute()
+    assert (
+        "the directory that you are in has been deleted"
+        in translate_error(refused.value, "backup", debug=False).message
+    )

@@ -1,4 +1,4 @@
-"""What ends a verb from outside while the gateway presses for it: Ctrl-C, SIGTERM, a closed terminal (not with nohup).
+"""What ends a verb from outside while the gateway presses for it: Ctrl-C, Ctrl-\\, SIGTERM, a closed terminal (not with nohup).
 
 All come as KeyboardInterrupt, so that who has begun something stops it, and not at once while a request is under way: one that
 is cut in the middle may have begun what nobody would stop.
@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from gateway.service.supervisor.event_wait import StopSignals
 
-_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @contextmanager

@@ -30,20 +30,24 @@ def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: b
         signal.signal(signal.SIGHUP, before)
 
 
+@pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGQUIT, signal.SIGXCPU])
 @pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])
-def test_a_hold_that_would_be_suspended_lets_go_instead(is_ignored: bool, stops: bool) -> None:
-    """Behind Ctrl-Z the tool pressed on, where the rig has no lease, and nobody watched it; with one it was a fault A310."""
+def test_a_hold_that_would_be_suspended_or_killed_lets_go_instead(
+    is_ignored: bool, stops: bool, number: signal.Signals
+) -> None:
+    """Behind Ctrl-Z, Ctrl-\\ and the end of `ulimit -t` the tool pressed on, where the rig has no lease, and nobody watched it;
+    with one it was a fault A310."""
     beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     suspended = threading.Event()
-    handler = signal.SIG_IGN if is_ignored else lambda number, frame: suspended.set()
-    before = signal.signal(signal.SIGTSTP, handler)
+    handler = signal.SIG_IGN if is_ignored else lambda *_: suspended.set()
+    before = signal.signal(number, handler)
     try:
         with _handle_signals(beat):
-            os.kill(os.getpid(), signal.SIGTSTP)
+            os.kill(os.getpid(), number)
             assert (beat.stopping.is_set(), beat.dropping.is_set(), suspended.is_set()) == (stops, False, False)
-        assert signal.getsignal(signal.SIGTSTP) is handler
+        assert signal.getsignal(number) is handler
     finally:
-        signal.signal(signal.SIGTSTP, before)
+        signal.signal(number, before)
 
 
 SHOWING = """

@@ -8,7 +8,7 @@ import pytest
 
 from gateway.cli.master.ending_signals import signals_as_ctrl_c, watch_to_the_end
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @pytest.fixture(autouse=True)

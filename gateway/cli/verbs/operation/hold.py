@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
 
 _SHOW_S: Final = 0.1
+_HEARD_UNLESS_IGNORED: Final = (signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT, signal.SIGXCPU)
 
 
 def _parse_time(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
@@ -154,9 +155,9 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """The first of Ctrl-C, Ctrl-Z, SIGTERM and a closed terminal (not with nohup) ramps down, a second one but that drops the
-    force at once; where none is held any more it ends us. Suspended by Ctrl-Z nobody would watch a force that goes on, and its
-    heartbeat would stand still."""
+    """The first of Ctrl-C, Ctrl-Z, Ctrl-\\, SIGTERM, a closed terminal (not with nohup) and used up time (`ulimit -t`) ramps
+    down, a second one but a closed terminal drops the force at once; where none is held any more it ends us. Suspended by
+    Ctrl-Z nobody would watch a force that goes on, and its heartbeat would stand still."""
     from gateway.service.supervisor.event_wait import StopSignals
 
     stops = StopSignals(clock)
@@ -171,7 +172,7 @@ def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.m
             (beat.dropping if beat.stopping.is_set() and number != signal.SIGHUP else beat.stopping).set()
 
     heard = [signal.SIGINT, signal.SIGTERM]
-    heard += [each for each in (signal.SIGHUP, signal.SIGTSTP) if signal.getsignal(each) is not signal.SIG_IGN]
+    heard += [each for each in _HEARD_UNLESS_IGNORED if signal.getsignal(each) is not signal.SIG_IGN]
     before = {number: signal.signal(number, on_signal) for number in heard}
     try:
         yield
