@@ -29,6 +29,12 @@ def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
     raise no_such_recording(path)
 
 
+def numbered_recording(number: int | str, directory: Path) -> Path:
+    """Return the file of a recording in a state directory by its number or as the `last` one. CliError or RecordingError where
+    there is none."""
+    return _last_recording(directory) if number == LAST else find_recording(directory, int(number))
+
+
 def _last_recording(directory: Path) -> Path:
     paths = recording_paths(directory)
     if not paths:

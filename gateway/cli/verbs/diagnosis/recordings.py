@@ -16,6 +16,7 @@ from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.recordings.named_recording import LAST, numbered_recording
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
 
@@ -33,7 +34,7 @@ EXAMPLES = (
     "recordings prune --dry-run --days 30",
 )
 _number = click.argument(
-    "number", metavar="N", type=ListedNumber("recordings"), shell_complete=complete_recording_numbers
+    "number", metavar="N|last", type=ListedNumber("recordings", word=LAST), shell_complete=complete_recording_numbers
 )
 _yes = click.option("--yes", is_flag=True, help="Do not ask.")
 
@@ -72,13 +73,12 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
 @_number
 @state_options
 @json_option
-def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
+def show_command(*, number: int | str, state: StateChoice, as_json: bool) -> None:
     """Show recording N: what it is called, what happened in it, what it was made with."""
     from gateway.cli.recordings.listing import describe, facts_of, marks_of, reference_name
-    from gateway.recording import find_recording
     from gateway.recording.care.summaries import summary_of
 
-    path = find_recording(state.directory, number)
+    path = numbered_recording(number, state.directory)
     summary = {"path": str(path), **summary_of(path)}
     marks = marks_of(path, reference_name(state.directory))
     if as_json:
@@ -92,14 +92,14 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
 @click.option("-o", "--output", type=GivenPath(dir_okay=False), help="FILE.html or FILE.svg.")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
-def plot_command(*, number: int, output: Path | None, force: bool, state: StateChoice) -> None:
+def plot_command(*, number: int | str, output: Path | None, force: bool, state: StateChoice) -> None:
     """Draw recording N: forces and the command against time."""
     from gateway.cli.diagnosis.outputs import write_all
-    from gateway.recording import find_recording, read_recording
+    from gateway.recording import read_recording
     from gateway.reports.recording_plot import recording_page, recording_svg, why_no_picture
 
-    path = find_recording(state.directory, number)
-    target = output or Path(f"recording-{number:04d}.html")
+    path = numbered_recording(number, state.directory)
+    target = output or Path(f"recording-{path.stem}.html")
     draw = {".html": recording_page, ".svg": recording_svg}.get(target.suffix.lower())
     if draw is None:
         raise click.UsageError(f"{target}: a plot is FILE.html or FILE.svg")
@@ -107,7 +107,7 @@ def plot_command(*, number: int, output: Path | None, force: bool, state: StateC
         raise already_exists(target)
     recording = read_recording(path)
     if why := why_no_picture(recording):
-        raise CliError(f"E403 recording {number} {why}", exit_codes.DATA)
+        raise CliError(f"E403 recording {int(path.stem)} {why}", exit_codes.DATA)
     write_all({target: draw(recording)})
     click.echo(f"wrote {target}", err=True)
 
@@ -116,18 +116,17 @@ def plot_command(*, number: int, output: Path | None, force: bool, state: StateC
 @_number
 @click.option("--no", "lets_go", is_flag=True, help="Keep it no longer.")
 @state_options
-def keep_command(*, number: int, lets_go: bool, state: StateChoice) -> None:
+def keep_command(*, number: int | str, lets_go: bool, state: StateChoice) -> None:
     """Keep recording N: neither `delete` nor the retention takes it."""
-    from gateway.recording import find_recording
     from gateway.recording.care.keeping import keep_recording, let_recording_go
 
-    path = find_recording(state.directory, number)
+    path = numbered_recording(number, state.directory)
     (let_recording_go if lets_go else keep_recording)(path)
-    click.echo(f"recording {number} is kept{' no longer' if lets_go else ''}")
+    click.echo(f"recording {int(path.stem)} is kept{' no longer' if lets_go else ''}")
 
 
 @command.command(name="delete")
-@_number
+@click.argument("number", metavar="N", type=ListedNumber("recordings"), shell_complete=complete_recording_numbers)
 @_yes
 @state_options
 def delete_command(*, number: int, yes: bool, state: StateChoice) -> None:
@@ -161,7 +160,7 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 
 
 @command.command(name="export")
-@click.argument("number", metavar="N", type=ListedNumber("recordings"))
+@_number
 @click.option("--csv", "form", flag_value="csv", help="CSV with # key: value lines (default).")
 @click.option(
     "--parquet", "form", flag_value="parquet", help="Parquet with the facts as metadata (for -o FILE.parquet, too)."
@@ -169,12 +168,15 @@ def prune_command(*, dry_run: bool, yes: bool, state: StateChoice, days: float |
 @click.option("-o", "--output", type=GivenPath(allow_dash=True), help="File to write; - is stdout (CSV).")
 @click.option("--force", is_flag=True, help="Overwrite the file.")
 @state_options
-def export_command(*, number: int, form: str | None, output: Path | None, force: bool, state: StateChoice) -> None:
-    """Export recording N (a number of `recordings list`)."""
+def export_command(
+    *, number: int | str, form: str | None, output: Path | None, force: bool, state: StateChoice
+) -> None:
+    """Export recording N (a number of `recordings list`), or the last one."""
     from gateway import recording as room
 
     form = _form_of(form, output)
-    recording = room.read_recording(room.find_recording(state.directory, number))
+    path = numbered_recording(number, state.directory)
+    recording = room.read_recording(path)
     for note in recording.notes:
         click.echo(f"{recording.path}: {note}", err=True)
     if output == Path("-"):
@@ -182,7 +184,7 @@ def export_command(*, number: int, form: str | None, output: Path | None, force:
             raise click.UsageError("only CSV goes to stdout; give -o FILE")
         room.write_csv(recording, sys.stdout.buffer)
         return
-    target = output or Path(room.export_name(recording, number, form))
+    target = output or Path(room.export_name(recording, int(path.stem), form))
     if target.exists() and not force:
         raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)

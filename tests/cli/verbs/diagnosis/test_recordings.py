@@ -46,6 +46,18 @@ def test_show_says_everything_that_is_known(state: Path, call) -> None:
     assert (facts["id"], facts["kept"], facts["setpoint_changes"]) == (1, False, 1)
 
 
+@pytest.mark.parametrize("verb", ["show", "plot", "keep", "export"])
+def test_the_last_recording_is_shown_drawn_kept_and_exported_as_such_but_never_deleted(
+    verb: str, state: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(state)
+    answer = call("recordings", verb, "last", "--state", state)
+    assert answer.exit_code == 0, answer.output
+    named = {"show": "a-cell-with", "plot": "recording-0002.html", "keep": "recording 2", "export": "-0002.csv"}[verb]
+    assert named in answer.stdout + answer.stderr
+    assert "last is no number" in call("recordings", "delete", "last", "--yes", "--state", state).stderr
+
+
 def test_what_is_kept_is_not_deleted_until_it_is_let_go(state: Path, call) -> None:
     assert call("recordings", "keep", "1", "--state", state).exit_code == 0
     assert "kept" in call("recordings", "list", "--state", state).output.splitlines()[0]
