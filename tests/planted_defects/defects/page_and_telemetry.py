@@ -95,4 +95,7 @@ DEFECTS = (
            "except (OSError, ValueError):  # a control that is being restarted\n                pass",
            "except (OSError, ValueError):  # a control that is being restarted\n                return",
            ("web/test_who_beats.py",)),
+    Defect("the page calls two calibrations the one in use", "web/tabs/stored_documents.py",
+           "store.built_in.number if selected.selection.number is None else None", "store.built_in.number",
+           ("web/tabs/test_calibrations_tab.py",)),
 )  # fmt: skip
