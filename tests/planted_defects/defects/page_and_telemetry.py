@@ -98,4 +98,10 @@ DEFECTS = (
     Defect("the page calls two calibrations the one in use", "web/tabs/stored_documents.py",
            "store.built_in.number if selected.selection.number is None else None", "store.built_in.number",
            ("web/tabs/test_calibrations_tab.py",)),
+    Defect("one answer that was lost ends a run of the page", "web/tabs/run_follower.py",
+           "with contextlib.suppress(OSError, ValueError):", "with contextlib.suppress(ValueError):",
+           ("web/tabs/test_run_of_the_page.py",)),
+    Defect("a run is let go that begins behind a long silence", "web/tabs/run_follower.py",
+           "        self._seen_s = self._clock()\n        self._last = await", "        self._last = await",
+           ("web/tabs/test_run_of_the_page.py",)),
 )  # fmt: skip
