@@ -17,6 +17,8 @@ from typing import Any, Final
 from tests.disk.watched_disk import Call, WatchedDisk
 
 MODES: Final = ("nothing", "everything", "names only", "data only", "some")
+LAST: Final = "the last alone"
+"""Of what was not synced, before all that came sooner: whatever relies on an order without a sync shows by this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +98,7 @@ class JournaledDisk(WatchedDisk):
 
     def states(self, cut: int, seed: int) -> Iterator[tuple[str, Tree]]:
         """What the folder may hold after a cut behind so many changes."""
-        for mode in MODES:
+        for mode in (*MODES, LAST):
             yield mode, self._state(cut, mode, Random(f"{seed} {cut} {mode}"))
 
     def _state(self, cut: int, mode: str, chance: Random) -> Tree:
@@ -104,6 +106,7 @@ class JournaledDisk(WatchedDisk):
         for at, change in enumerate(self.changes[:cut]):
             is_name = bool(change.links)
             reaches = {"nothing": False, "everything": True, "names only": is_name, "data only": not is_name}
+            reaches[LAST] = at == cut - 1
             if is_synced(at) or reaches.get(mode, chance.random() < 0.5):
                 whole = is_synced(at) or mode != "some" or chance.random() < 0.5
                 data = change.data or b""

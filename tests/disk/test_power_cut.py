@@ -7,17 +7,19 @@ from random import Random
 import pytest
 
 from gateway.calibrations.store import CalibrationStore
+from gateway.processes.state_directory import put_back
 from tests.calibrations.coefficients import calibration
 from tests.disk.acts.acts import Act, AuditedWrites
 from tests.disk.acts.all_acts import SYNCED
+from tests.disk.acts.file_acts import Restored
 from tests.disk.power_cut import JournaledDisk
 from tests.disk.test_failing_calls import try_once
 from tests.disk.watched_disk import watching
 
-CUTS = 2
+CUTS = 12
 SEEDS = 5
-"""In the push gate so many cuts of each act, and the one behind all of it; with --long all of them, each with so many mixtures
-of what was not synced."""
+"""In the push gate so many cuts of each act, all of those that change little, and the one behind all of it; with --long all of
+them, each with so many mixtures of what was not synced."""
 
 
 def journal(act: Act) -> JournaledDisk:
@@ -100,3 +102,18 @@ def test_a_power_cut_while_an_audit_begins_is_not_called_tampering(fast_folder: 
             again: list[object] = []
             assert try_once(after, again) is None, (cut, mode)
             after.check(again)
+
+
+def test_a_state_that_a_restore_had_set_aside_is_put_back_by_the_next_start(fast_folder: Path) -> None:
+    """Wherever the power went: else the gateway would begin anew, and its calibrations would stand beside it."""
+    state = fast_folder / "state"
+    state.mkdir()
+    disk, set_aside = journal(Restored(state)), 0
+    for cut in range(len(disk.changes) + 1):
+        for mode, tree in disk.states(cut, 0):
+            cell = fast_folder / f"{cut}-{mode}" / "cell"
+            tree.write_to(cell.parent)
+            if not cell.exists():
+                set_aside += 1
+                assert put_back(cell) and cell.exists(), f"cut behind change {cut}, {mode}"
+    assert set_aside

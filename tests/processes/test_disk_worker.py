@@ -39,6 +39,25 @@ def test_work_that_no_thread_can_be_had_for_is_refused_for_good(monkeypatch: pyt
     assert done == ["done"]
 
 
+def test_work_that_fails_comes_back_with_its_error_and_the_next_is_done() -> None:
+    """Whoever asked waits for a word: of an upload that a full disk refuses, say, which would be under way for ever."""
+
+    def fail() -> None:
+        raise OSError(28, "full")
+
+    async def main() -> list[Any]:
+        worker, told, ended = DiskWorker(), list[Any](), asyncio.Event()
+        worker(fail, told.append)
+        worker(lambda: "done", lambda result: (told.append(result), ended.set()))
+        async with asyncio.timeout(10.0):
+            await ended.wait()
+        worker.close()
+        return told
+
+    error, result = asyncio.run(main())
+    assert isinstance(error, OSError) and error.errno == 28 and result == "done"
+
+
 def test_what_is_asked_for_behind_the_end_is_refused_as_by_a_disk_and_never_done() -> None:
     """A commit whose check was under way goes on to its next part, after the rig has closed: no defect of ours."""
     join_disk_threads()  # those of tests before

@@ -105,6 +105,16 @@ def test_another_code_of_the_same_cause_is_told_at_once_in_a_long_flood_and_two_
     assert sum(line.endswith("in turn") for line in told) <= 20
 
 
+def test_two_codes_within_a_second_are_no_flood_of_the_one_that_comes_last() -> None:
+    """Few enough of a second, and the flood of a code alone has one line a minute behind 600 of them."""
+    terminal = Terminal()
+    for second in range(250):
+        terminal.clock.now_s = float(second)
+        for code in ("A310", "A310", "W204", "A310"):
+            terminal.log("control", f"{code} by turns")
+    assert sum(line.endswith("by turns") for line in terminal.said()) == 1000
+
+
 def test_ten_lines_a_second_are_no_flood() -> None:
     terminal = Terminal()
     for second in range(5):

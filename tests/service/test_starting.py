@@ -50,6 +50,11 @@ def test_only_a_run_that_never_ended_is_unclean(tmp_path: Path) -> None:
     flag.clear()  # twice is no trouble
 
 
+def test_a_run_whose_end_cannot_be_known_is_unclean(tmp_path: Path) -> None:
+    """Whatever pressed may press still: a disk that gives no answer is no word that it has ended."""
+    assert CleanShutdownMarker(tmp_path / ("x" * 300)).mark_running(), "its name is refused as too long"
+
+
 def test_what_a_clean_end_leaves_counts_at_the_next_start_until_the_next_clean_end(tmp_path: Path) -> None:
     """A fault of a program that hung was restarted away, and its next frame pressed."""
     flag, left = CleanShutdownMarker(tmp_path), {"lost_beats": {"10.0.0.5": [7]}, "held_runs": {"10.0.0.6": 32}}

@@ -32,9 +32,33 @@ def test_taking_over_leaves_the_page_the_owner_and_the_one_that_beats(tmp_path: 
         await commands.take_ownership("me")
         assert wired.bank.owner == "web" and commands.commander == "me"
         began_s = wired.now_s
-        while wired.now_s < began_s + 1.0:
-            await asyncio.sleep(0)
+        await let_turns_pass(200)
+        assert wired.now_s > began_s + 1.0
         assert wired.state in (State.RAMPING, State.HOLDING), "the lease goes on by the page's beat"
+
+    play(tmp_path, scene, leased())
+
+
+@pytest.mark.parametrize("error", [ConnectionResetError(), TimeoutError(), ValueError("internal error")], ids=repr)
+def test_a_beat_that_came_to_nothing_is_not_the_last_one(tmp_path: Path, error: Exception) -> None:
+    """One question of a busy machine was lost, and with it the force, though the browser was there."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        await commands.enable("me", 12.0)
+        link: Any = commands._context.control
+        ask, errors = link.ask, [error]
+
+        async def fail_once(request: dict[str, Any]) -> dict[str, Any]:
+            if errors:
+                raise errors.pop()
+            return await ask(request)
+
+        link.ask = fail_once
+        began_s = stage.wired.now_s
+        await let_turns_pass(200)
+        assert not errors and stage.wired.now_s > began_s + 1.0, "it beats on"
+        assert stage.wired.state in (State.RAMPING, State.HOLDING)
 
     play(tmp_path, scene, leased())
 

@@ -39,7 +39,7 @@ class ControlChild:
     heartbeat: Heartbeat = field(default_factory=Heartbeat)
     memory: HeartbeatMemory | None = None  # where its loop beats; without it each beat is a message
     safe_line: SafeLine | None = None  # stays after a death until the safe voltage has gone through it
-    is_line_lost: bool = False  # its port is gone, and no other has been handed over since
+    is_line_lost: bool = False  # its port is gone: counts where there is no line
     reported_cause: Ending | None = None  # what control gave as its own first cause
     kept: dict[str, Any] = field(default_factory=dict)  # what the last one has told for the next one
     is_link_ended: bool = False
@@ -172,7 +172,6 @@ class ControlChild:
         is_reply = re.compile(form) if form else None  # here: one that is none must not wait for the last write
         timeout_s = float(message.body.get("reply_timeout_s", REPLY_S))
         self._drop_line()
-        self.is_line_lost = False
         self.safe_line = SafeLine(message.descriptors.pop(0), frame, reply, end, is_reply, timeout_s)
 
     def _drop_line(self) -> None:

@@ -146,7 +146,7 @@ def is_adopted(line: socket.socket) -> bool:
             message = guardian_link.receive(line)
             if message is None or message.tag in (guardian_link.ADOPTED, guardian_link.STOP):
                 return message is not None and message.tag == guardian_link.ADOPTED
-            message.drop_descriptors()  # where the rig has moved to is told again when it is asked for
+            # else where the rig has moved to, which is told again when it is asked for
     except (OSError, guardian_link.ProtocolError):
         return False
 

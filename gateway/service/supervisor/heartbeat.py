@@ -50,7 +50,7 @@ class Heartbeat:
 
     def reset(self) -> None:
         """Forget the last beat: another control process begins."""
-        self._beat_s, self._used, self._was_late = None, None, False
+        self._beat_s = None
 
     def record_beat(self, control: Child, now_s: float) -> None:
         """Record a beat of control at now_s."""

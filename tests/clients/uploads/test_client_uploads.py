@@ -32,8 +32,8 @@ def words_of(model: dict[str, Any]) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.sampled
 def test_an_upload_is_staged_committed_and_awaited(client: Any, gateway: GatewayAtHand) -> None:
+    """Of every language in each push: a set in another slot, or with a word at another place, is another force."""
     client.enable(4.0)
     cycles(client)
     client.begin_upload(MODEL, 3)

@@ -30,6 +30,16 @@ def test_a_zero_beyond_half_of_the_saturation_leaves_no_range_to_measure(share):
     assert ("stuck in contact or wrong cell" in zero.unsteady(0.0)) is (abs(share) > 0.5)
 
 
+@pytest.mark.parametrize(("quantum_n", "allowed_n"), [(0.001, 0.5), (0.1, 0.5), (0.4, 2.0)])
+def test_a_zero_may_wander_by_half_a_newton_or_by_five_counts_of_a_coarse_cell(quantum_n, allowed_n):
+    """Of a fine cell five counts are less than what warms up or swings on any machine: it could never be tared."""
+    for share, why in ((0.95, ""), (1.05, f"allowed {allowed_n:.2f} N")):
+        zero = Zero(replace(settings().supervision, sample_quantum_n=quantum_n))
+        for reading in range(20):
+            zero.observe(share * allowed_n * reading / 19, 0.01)
+        assert why in zero.unsteady(0.0) and bool(why) is bool(zero.unsteady(0.0))
+
+
 def test_of_a_fast_cell_no_sample_of_before_a_gap_is_in_the_zero_behind_it() -> None:
     zero = Zero(settings().supervision)
     zero.observe(20.0, 0.004)

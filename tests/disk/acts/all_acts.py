@@ -3,7 +3,16 @@
 from typing import Final
 
 from tests.disk.acts.acts import Act, AuditedWrites, StoredCalibrations, StoredPlants
-from tests.disk.acts.file_acts import BackedUp, Bundled, CleanEnd, CountedBirths, Exported, ReportedFit, Restored
+from tests.disk.acts.file_acts import (
+    BackedUp,
+    Bundled,
+    CleanEnd,
+    CleanEndOfNobody,
+    CountedBirths,
+    Exported,
+    ReportedFit,
+    Restored,
+)
 from tests.disk.acts.recording_acts import KeptRecordings, OneRecording, ReferenceRecordingKept, SyncedRecording
 
 BOTH: Final[tuple[type[Act], ...]] = (
@@ -20,4 +29,4 @@ BOTH: Final[tuple[type[Act], ...]] = (
     Restored,
 )
 REFUSED: Final = (*BOTH, OneRecording)
-SYNCED: Final = (*BOTH, CountedBirths, CleanEnd)
+SYNCED: Final = (*BOTH, CountedBirths, CleanEnd, CleanEndOfNobody)

@@ -5,7 +5,7 @@ import shutil
 import tarfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -143,6 +143,12 @@ class CleanEnd(Act):
         assert "ended" in said or not said or is_unclean or left == self.AFTER
         assert "ended" not in said or (left == self.AFTER and not is_unclean)
         marker.clear(left)
+
+
+class CleanEndOfNobody(CleanEnd):
+    """It leaves nothing: what was left before counts no more, or the master of then is refused once more."""
+
+    AFTER: ClassVar[dict[str, dict[str, list[int]]]] = {}
 
 
 class Exported(Act):

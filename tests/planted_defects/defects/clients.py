@@ -53,4 +53,6 @@ DEFECTS = (
            "            return self._write(0)\n        if self._phase is _Phase.RESETTING",
            "            return self._write(_RESET)\n        if self._phase is _Phase.RESETTING",
            ("cli/force_hold/test_sequence.py",)),
+    Defect("a program of C uploads to slot 0 whichever is asked for", "clients/templates/c.h",
+           "    tail[${tail_slot}] = slot;\n", "", ("clients/uploads/test_client_uploads.py",)),
 )  # fmt: skip

@@ -95,4 +95,10 @@ DEFECTS = (
     Defect("what another is writing is removed", "processes/durable_file.py",
            "                if _is_ours(descriptor, path):\n                    path.unlink()",
            "                if True:\n                    path.unlink()", ("processes/test_durable_file.py",)),
+    Defect("what an end before has left counts behind a power cut", "service/clean_shutdown_marker.py",
+           "                self._left.unlink(missing_ok=True)\n                os.fsync(directory)",
+           "                self._left.unlink(missing_ok=True)", ("disk/test_power_cut.py",)),
+    Defect("a restore that the power has cut is known by nothing", "cli/state_archive.py",
+           "    sync_path(state.parent)\n    previous = _set_aside(state)", "    previous = _set_aside(state)",
+           ("disk/test_power_cut.py",)),
 )  # fmt: skip

@@ -116,4 +116,11 @@ DEFECTS = (
            "        self._is_last, self._read_s = not chunk,",
            "        self._server.note_activity(self)\n        self._is_last, self._read_s = not chunk,",
            ("service/requests/drawn/test_drawn_requests.py",)),
+    Defect("a slow line is given up in the middle of its safe frame", "service/supervisor/safe_line.py",
+           "view, deadline_s = view[sent:], time.monotonic() + timeout_s", "view = view[sent:]",
+           ("service/supervisor/test_safe_line_failures.py",)),
+    Defect("Ctrl-Z stops the guardian, and the force goes on", "service/supervisor/event_wait.py",
+           "    signal.SIGTSTP,\n", "", ("service/supervisor/test_event_wait.py",)),
+    Defect("a run of whose end nobody knows has ended well", "service/clean_shutdown_marker.py",
+           "            was_unclean = True\n", "            was_unclean = False\n", ("service/test_starting.py",)),
 )  # fmt: skip

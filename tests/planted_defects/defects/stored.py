@@ -177,4 +177,7 @@ DEFECTS = (
     Defect("a thousand strangers have a robot's setpoints forgotten", "audit/write_audit.py",
            "if len(self._series) >= MOST_SERIES:\n            self.close()",
            "if len(self._series) >= MOST_SERIES:\n            self._series.clear()", ("audit/test_write_audit.py",)),
+    Defect("what a disk refuses never comes back", "processes/disk_worker.py",
+           "loop.call_soon_threadsafe(done, future.exception() or future.result())",
+           "loop.call_soon_threadsafe(done, future.result())", ("processes/test_disk_worker.py",)),
 )  # fmt: skip

@@ -150,4 +150,10 @@ DEFECTS = (
     Defect("a force that went down is held for a lost master as it was", "control/transitions.py",
            "min(self.held_n, self.parts.loop.applied_n, lowered_n)", "min(self.held_n, lowered_n)",
            ("control/test_transitions.py",)),
+    Defect("a cell with a fine count can never be tared", "control/tare.py",
+           "max(5.0 * supervision.sample_quantum_n, 0.5)", "5.0 * supervision.sample_quantum_n",
+           ("control/zero/test_zero.py",)),
+    Defect("a rig that says nothing of it holds a lost master's force", "control/settings.py",
+           "lease_action: LeaseAction = LeaseAction.FAULT", "lease_action: LeaseAction = LeaseAction.HOLD",
+           ("profiles/rigs/test_shipped_bounds.py",)),
 )  # fmt: skip

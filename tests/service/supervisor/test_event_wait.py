@@ -27,6 +27,15 @@ def as_at_start():
         signal.signal(number, handler)
 
 
+def test_every_stray_signal_is_ignored_and_none_is_a_stop(as_at_start):
+    """Each of them in every run: of those below, whose children cost time, a push takes some."""
+    with SignalPipe() as signals:
+        for number in map(signal.Signals.__getitem__, _STRAY + _STOPS):
+            assert signal.getsignal(number) is signal.SIG_IGN, f"{number.name} would end or stop this test run"
+            os.kill(os.getpid(), number)
+        assert signals.take() == 0
+
+
 @pytest.mark.sampled
 @pytest.mark.parametrize("name", _STRAY + _STOPS)
 def test_a_stray_signal_ends_neither_the_guardian_nor_its_children(as_at_start, name):

@@ -6,6 +6,7 @@ import os
 import socket
 import termios
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -123,6 +124,25 @@ def test_a_line_that_takes_a_byte_at_a_time_gets_the_whole_frame(monkeypatch: py
     write = os.write
     with monkeypatch.context() as patch:
         patch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:1]))
+        assert SafeLine(writer, FRAME, b"", END).write_safe(SHORT_S)
+    assert os.read(reader, 64) == FRAME
+    os.close(reader)
+    os.close(writer)
+
+
+def test_a_slow_line_that_goes_on_taking_bytes_is_not_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The patience is for a line that takes nothing: each byte took most of it, and the frame would end in its middle."""
+    reader, writer = os.pipe()
+    write, now_s = os.write, 0.0
+
+    def write_slowly(descriptor: int, data: bytes) -> int:
+        nonlocal now_s
+        now_s += 0.8 * SHORT_S
+        return write(descriptor, data[:1])
+
+    with monkeypatch.context() as patch:
+        patch.setattr(time, "monotonic", lambda: now_s)
+        patch.setattr(os, "write", write_slowly)
         assert SafeLine(writer, FRAME, b"", END).write_safe(SHORT_S)
     assert os.read(reader, 64) == FRAME
     os.close(reader)

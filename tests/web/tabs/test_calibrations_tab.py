@@ -42,6 +42,17 @@ def test_the_list_has_the_rigs_own_the_stored_ones_and_the_damaged_ones(page, st
     assert answer["can_go_back"] is False
 
 
+@pytest.mark.parametrize("noun", ["calibrations", "plants"])
+def test_one_of_each_list_is_in_use_and_it_is_the_one_that_the_store_says(page, state, noun) -> None:
+    number = add_calibration(state) if noun == "calibrations" else add_plant(state)
+    store = CalibrationStore(state, load_calibration("demo")) if noun == "calibrations" else PlantStore(state)
+    assert [row["active"] for row in page.get(f"/api/v1/{noun}").json[noun]] == [False, True], "the rig's own"
+    store.use(number)
+    answer = page.get(f"/api/v1/{noun}").json
+    assert [(row["number"], row["is_own"]) for row in answer[noun] if row["active"]] == [(number, False)]
+    assert answer["can_go_back"] is True and [row["fault"] for row in answer[noun]] == ["", ""]
+
+
 def test_use_and_back_change_what_is_in_use_and_a_rejected_one_is_asked_for_twice(page, state) -> None:
     number = add_calibration(state, rejected="0.9 N RMS, allowed 0.5")
     refused = page.post("/api/v1/calibrations/change", {"use": number})

@@ -10,6 +10,7 @@ from gateway.web.context import WebContext
 from gateway.web.events import EventSource
 from gateway.web.security import PageAccess
 from gateway.web.server import make_app
+from gateway.web.tabs import run_follower
 from gateway.web.tabs.run_follower import ABANDONED_S, RunFollower
 from tests.web.tabs.scripted_control import IDLE
 
@@ -67,6 +68,47 @@ def test_a_run_goes_on_while_a_page_is_open_whatever_tab_it_shows(state, control
                 await asyncio.sleep(0.01)
 
     asyncio.run(begin_and_look_elsewhere())
+
+
+def test_who_begins_a_run_has_looked_however_long_ago_anybody_else_did(state, control) -> None:
+    """A browser that came back after minutes began a run, and it was let go with its first stair."""
+    now_s = [0.0]
+
+    async def come_back_and_begin() -> None:
+        follower = RunFollower(WebContext(state, "demo", True, ControlLink(state)), lambda: now_s[0])
+        now_s[0] = 10.0 * ABANDONED_S
+        await follower.begin(PLAN["plan"], "")
+        await asyncio.to_thread(control.wait_for, "calibrate", control.count("calibrate") + 2)
+        assert follower.is_following
+        now_s[0] += ABANDONED_S
+        async with asyncio.timeout(10.0):
+            while follower.is_following:
+                await asyncio.sleep(0.01)
+
+    asyncio.run(come_back_and_begin())
+
+
+@pytest.mark.parametrize("error", [ConnectionResetError(), TimeoutError(), ValueError("internal error")], ids=repr)
+def test_one_question_that_came_to_nothing_does_not_end_a_run(state, control, monkeypatch, error) -> None:
+    """Control takes a run whose page is silent for abandoned: one answer that was lost on a busy machine stopped it."""
+
+    async def begin_and_lose_an_answer() -> None:
+        context = WebContext(state, "demo", True, ControlLink(state))
+        follower = RunFollower(context)
+        await follower.begin(PLAN["plan"], "")
+        ask, errors = run_follower.ask_once, [error]
+
+        async def lose_once(*words):
+            if errors:
+                raise errors.pop()
+            return await ask(*words)
+
+        monkeypatch.setattr(run_follower, "ask_once", lose_once)
+        await asyncio.to_thread(control.wait_for, "calibrate", control.count("calibrate") + 3)
+        assert not errors and follower.is_following
+        await context.end_work()
+
+    asyncio.run(begin_and_lose_an_answer())
 
 
 def test_the_page_counts_who_looks(state, monkeypatch: pytest.MonkeyPatch) -> None:

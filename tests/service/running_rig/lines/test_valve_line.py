@@ -91,6 +91,19 @@ def test_a_relay_that_refuses_is_quoted_until_it_obeys_or_the_order_is_gone(
     assert relay.line.status.said == "", "another device may be behind the port"
 
 
+def test_half_an_answer_does_not_spoil_the_next_one() -> None:
+    """Of words with a line end the half stood before the next answer, and the valve was silent for as long again."""
+    relay = Relay(PULL, load_device("mcu-valve")).run(0.5)
+    while not relay.answers:
+        relay.run(0.005)
+    (due_s, answer), asked = relay.answers[0], len(relay.asked)
+    relay.answers[:] = [(due_s, answer[:-2])]
+    while len(relay.asked) == asked:
+        relay.run(0.005)
+    relay.run(0.03)
+    assert relay.line.status.unanswered_since_s is None and relay.line.counts.garbled == 0
+
+
 def test_an_order_waits_until_the_valve_has_said_where_it_stands() -> None:
     relay = Relay()
     relay.line.set_direction(PULL, relay.now_s)
