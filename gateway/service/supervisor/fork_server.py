@@ -127,10 +127,10 @@ def _run_child(message: guardian_link.Message, parent: int) -> int:
     arguments.update(zip(given, shared, strict=True))  # here they have other numbers
     words = [str(theirs), json.dumps(arguments)]
     show_command([sys.executable, "-m", module, *words])
-    line = socket.socket(fileno=theirs)
-    if not is_adopted(line):
-        return 0  # nobody waits for us any more
-    line.detach()
+    with socket.socket(fileno=theirs) as line:
+        if not is_adopted(line):
+            return 0  # nobody waits for us any more
+        line.detach()
     code: int = import_module(module).main(words)
     return code
 
