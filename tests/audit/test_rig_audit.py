@@ -172,3 +172,25 @@ def test_a_number_that_is_none_and_what_was_only_counted_reach_the_disk(tmp_path
     told = [(record["what"], record.get("count"), record.get("new")) for record in read_audit(tmp_path)]
     assert told[:2] == [("write", None, None)] * 2
     assert told[-2:] == [("force_setpoint", 6, 0.07), ("end", None, None)]
+
+
+def test_what_was_only_counted_is_told_when_its_time_is_over_and_not_at_the_end_alone(tmp_path: Path) -> None:
+    """A gateway runs for months: the last value of a path that was driven is told a while behind it."""
+
+    async def run() -> None:
+        now = [0.0]
+        audit = RigAudit(tmp_path, lambda cause, sentence: None, lambda: now[0])
+        bank = RegisterBank(
+            load_register_map("force-v1"), BankRules(rig_name="demo", force_max_n=60.0), now=lambda: now[0]
+        )
+        audit.watch(bank)
+        for counts in range(1, 8):
+            bank.write_registers(1, struct.pack(">H", counts), ROBOT)
+        now[0] = 3600.0
+        audit.flush()
+        audit.note_gateway("calibration")
+        await audit.close()
+
+    asyncio.run(run())
+    told = [(record["what"], record.get("count")) for record in read_audit(tmp_path)][-3:]
+    assert told == [("force_setpoint", 6), ("calibration", None), ("end", None)]

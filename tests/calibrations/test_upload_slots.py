@@ -256,3 +256,12 @@ def test_a_commit_that_is_refused_leaves_the_words_to_who_has_staged_them(bench:
     bench.bank.write_registers(COMMIT_AT, struct.pack(">H", 1), FIRST[0])
     bench.run()
     assert bench.status is CommitStatus.COMMITTED and bench.active_slot == FIRST[2]
+
+
+def test_a_tool_is_told_the_reason_of_the_job_that_failed_and_none_behind_one_that_did_not(bench: Bench) -> None:
+    """Its exit code says by that whether the disk or the calibration is to blame."""
+    bench.upload.use(77)
+    bench.run()
+    assert (bench.upload.status()["failed"], bench.upload.status()["reason"]) == (True, UploadReason.NOT_STORED)
+    bench.upload_of(calibration(16))
+    assert (bench.upload.status()["failed"], bench.upload.status()["reason"]) == (False, 0)

@@ -27,6 +27,7 @@ OUTPUT_FAULT = RefusalReason.OUTPUT_FAULT
             True,
             "240 ms late in that time, 200 ms of them waiting for a processor",
         ),
+        (Held(loop_late_s=0.16, loop_waited_s=0.09), True, "160 ms late in that time, 90 ms of them waiting"),
         (Held(loop_late_s=0.24, loop_waited_s=0.01), False, "240 ms late in that time, only 10 ms of them waiting"),
         (Held(loop_late_s=0.24), False, "240 ms late in that time, not counted why: this machine stood still"),
         (

@@ -128,5 +128,14 @@ def test_a_certificate_owns_and_not_its_address(bank, master_of):
     assert bank.command.force_setpoint_n == 13.0
 
 
+def test_a_byte_order_is_proven_by_a_certificate_and_not_for_its_address(make_bank, master_of):
+    bank = make_bank(require_byte_order_echo=True)
+    robot, plc = (master_of(bank, "10.0.0.1", name=name) for name in ("robot", "plc"))
+    robot.write_float(416, 1234.5)
+    assert plc.refusal(plc.write, 0, 1).reason is RefusalReason.BYTE_ORDER_UNPROVEN
+    master_of(bank, "10.0.0.9", name="robot").write(0, 1)
+    assert bank.owner == "certificate robot"
+
+
 def test_no_address_is_taken_for_a_certificate():
     assert Peer("10.0.0.1", name="10.0.0.2").identity != Peer("10.0.0.2").identity

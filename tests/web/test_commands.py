@@ -1,6 +1,7 @@
 """What the page may do to the force, on a whole gateway in virtual time: as any master, for as long as its browser is there."""
 
 import asyncio
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -132,9 +133,11 @@ def test_an_enable_leaves_the_valve_where_it_stands() -> None:
 @pytest.mark.parametrize("force_n", [70.0, -1.0, 1e9, float("nan"), float("inf")])
 def test_a_force_that_is_not_allowed_is_refused_in_the_gateway_s_words(tmp_path: Path, force_n: float) -> None:
     async def scene(commands: Commands, stage: Stage) -> None:
+        before = stage.wired.bank.refusals
         with pytest.raises(RefusedCommand, match=r"force_setpoint|newtons"):
             await commands.enable("me", force_n)
         assert stage.wired.state is State.OFF
+        assert isfinite(force_n) or stage.wired.bank.refusals == before, "what is no number goes to no register"
 
     play(tmp_path, scene)
 
@@ -165,6 +168,27 @@ def test_a_lease_is_kept_while_the_browser_is_there_and_not_a_second_longer_than
         assert wired.state is State.OFF
 
     play(tmp_path, scene, leased())
+
+
+def test_an_enable_brings_another_heartbeat_than_the_one_that_stands_whoever_has_written_that(tmp_path: Path) -> None:
+    """By the same one it would be a program's that stands still (W302), and the page would be refused for nothing."""
+
+    async def scene(commands: Commands, stage: Stage) -> None:
+        commands.join("me")
+        stage.wired.write(4, 1)  # as the page's first would be
+        await commands.enable("me", 12.0)
+        assert stage.wired.word("heartbeat") != 1 and stage.wired.bank.owner == "web"
+
+    play(tmp_path, scene, leased())
+
+
+def test_behind_the_largest_heartbeat_a_reset_brings_the_smallest(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        stage.wired.write(4, 0xFFFF)
+        await commands.reset()
+        assert stage.wired.word("heartbeat") == 1
+
+    play(tmp_path, scene)
 
 
 def test_behind_a_stop_nobody_beats_any_more(tmp_path: Path) -> None:

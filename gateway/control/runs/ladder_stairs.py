@@ -10,7 +10,6 @@ Defaults: LADDER_STEP_V, LADDER_GROUPS, LADDER_MINOR_POINTS and LADDER_RESPONSE_
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import isfinite
 from typing import Final
 
 from gateway import defaults
@@ -97,7 +96,7 @@ def highest_force_n(limits: Limits) -> float:
 def _top(asked_v: float | None, limits: Limits, model: Bsfm) -> float:
     if asked_v is None:
         return highest_voltage_v(limits, model)
-    if not (isfinite(asked_v) and 0.0 < asked_v <= limits.voltage_max_v):
+    if not 0.0 < asked_v <= limits.voltage_max_v:  # nor is nan
         raise ValueError(f"v_max = {asked_v:g} V, allowed up to {limits.voltage_max_v:g} V (rig limits)")
     beyond = max(1.0, asked_v / model.voltage_range_v[1])  # the model itself ends there
     expected_n = beyond * model.force_n(asked_v, float(RISING))  # the way down presses less than the top
@@ -115,7 +114,7 @@ def _top(asked_v: float | None, limits: Limits, model: Bsfm) -> float:
 
 
 def _check(plan: CalibrationPlan, top_v: float) -> None:
-    if not (isfinite(plan.step_v) and 0.01 <= plan.step_v <= top_v / 3.0):
+    if not 0.01 <= plan.step_v <= top_v / 3.0:
         raise ValueError(
             f"step = {plan.step_v:g} V, allowed 0.01 .. {top_v / 3.0:.2f} V (three stairs each way at least)"
         )

@@ -85,7 +85,7 @@ class OneShotEvents:
         is_unreachable = loop.unreachable
         is_first, self._was_unreachable = is_unreachable and not self._was_unreachable, is_unreachable
         sentence = self._unreachable_sentence(loop, measured_n, inputs.expected_n) if is_first else ""
-        if loop.settling.holds_force and inputs.touching:
+        if loop.settling.holds_force:
             self._learn(loop.voltage_v)
         return sentence
 

@@ -114,7 +114,6 @@ class HeldEnables:
         self._refused: dict[tuple[str, bool], _Refused] = {}  # of each host its last refused start; True: its last tare
         self._told_s = 0.0
         self._ahead: Command | None = None  # whose heartbeat is noted later
-        self._is_moving = False  # it was another one than in the command before
 
     def note(self, host: str, now_s: float) -> None:
         """Note that a host has written enable as 1, and that this was refused because a fault is latched."""
@@ -180,24 +179,19 @@ class HeldEnables:
 
     def follow_later(self, command: Command) -> None:
         """Have noted what the frame of a command brings, of a host of which nothing is known, before it is asked for: of one
-        that comes again and again only the last heartbeat is, and whether it moved."""
+        that comes again and again only the last heartbeat is. Whatever was refused, that host has moved since."""
         ahead, channel = self._ahead, command.channel
         if channel == NO_BEAT or not self._has_lease:
             return
         if ahead is None or channel != ahead.channel:
             self.follow()
-        elif command.heartbeat != ahead.heartbeat:
-            self._is_moving = True
         self._ahead = command
 
     def follow(self) -> None:
         """Note what was left for later."""
-        if (ahead := self._ahead) is None:
-            return
-        if self._is_moving:
-            self.frames.count_move(ahead.peer)
-        self.frames.note(ahead.channel, ahead.heartbeat)
-        self._ahead, self._is_moving = None, False
+        if ahead := self._ahead:
+            self.frames.note(ahead.channel, ahead.heartbeat)
+            self._ahead = None
 
     def has_beaten(self, host: str) -> bool:
         """Decide whether a host has written a heartbeat: a person writes none."""
@@ -298,7 +292,6 @@ class HeldEnables:
     def _find(self, host: str) -> None:
         """A lost master is there again: the next process must not refuse what a program that goes on writes."""
         self.lost.pop(host, None)
-        self._let_go_s.pop(host, None)
         self._miss_no_more(host)
 
     def _miss_no_more(self, host: str) -> None:

@@ -173,6 +173,19 @@ def test_the_force_follows_as_the_rig_says_less_what_the_lead_gains(
     assert loop_of(rig, timing)._course(rig) == pytest.approx(course)
 
 
+def test_a_trim_that_has_reached_its_limit_is_told_so_until_it_is_well_below() -> None:
+    """Noise, and a target that moves, take it off by a hair: a warning that comes and goes is no warning."""
+    loop = pressed(loop_of(), 20.0)
+    told = []
+    for measured_n in (*[15.0] * 60, *[22.0] * 12):
+        loop.elapse(0.01, LINE)
+        loop.step(wish(20.0), inputs(measured_n))
+        told.append((loop.trim_v / 0.6, loop.is_trim_at_limit))
+    reached = [share for share, _ in told].index(1.0)
+    assert not any(is_told for _, is_told in told[:reached]) and max(share for share, _ in told[:reached]) > 0.9
+    assert all(is_told is (share > 0.8) for share, is_told in told[reached:]) and not told[-1][1]
+
+
 def test_a_rest_forgets_everything_that_the_output_did() -> None:
     loop = pressed(loop_of(), 20.0)
     loop.step(wish(20.0), inputs(15.0))

@@ -55,6 +55,11 @@ def test_newtons_are_those_of_the_rising_branch() -> None:
     assert bsfm().branches.rising.value(moved.voltage_v(0.5)) == pytest.approx(20.0)
 
 
+def test_a_force_that_the_rig_presses_at_its_least_voltage_already_is_that_voltage() -> None:
+    asked = plan(Move(do=MoveKind.STEP, to_n=1.0, hold_s=1.0))
+    assert segments_of(asked, replace(LIMITS, voltage_min_v=1.0), bsfm())[-1].to_v == 1.0
+
+
 @pytest.mark.parametrize(
     ("moves", "sentence"),
     [

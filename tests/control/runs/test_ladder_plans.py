@@ -41,6 +41,8 @@ def test_the_top_stays_below_the_over_force_trip() -> None:
     [
         (CalibrationPlan(step_v=0.0), "step = 0 V, allowed"),
         (CalibrationPlan(step_v=float("nan")), "step = nan V"),
+        (CalibrationPlan(step_v=float("inf")), "step = inf V"),
+        *((CalibrationPlan(v_max_v=float(told)), f"v_max = {told} V") for told in ("nan", "inf", "-inf")),
         (CalibrationPlan(v_max_v=12.0), "allowed up to 9 V"),
         (CalibrationPlan(v_max_v=9.01), "allowed up to 9 V"),
         (CalibrationPlan(groups=0), "groups = 0"),

@@ -53,6 +53,22 @@ def test_friction_that_is_shaken_loose_does_not_pass_the_stated_force() -> None:
     assert 0.5 * sum(curve.value(levels.second_v) for curve in (rising, falling)) <= most_n
 
 
+def test_a_machine_that_presses_at_rest_by_its_calibration_is_pressed_beyond_that() -> None:
+    """Right behind a tare it reads 0 there: two fifths of the way from 0 were less than it has without a volt."""
+    lifted = (RationalBezier(0.0, 8.0, [8.0, *ends], [1.0, 1.0, 1.0]) for ends in ((26.0, 57.0), (34.0, 57.0)))
+    levels = Levels(known(Bsfm(Branches(*lifted), LinearBlend(6.0))), FORCE_N, 0.0)
+    assert levels.base_n == 8.0 and levels.expected_n(levels.first_v) > 8.0 + 1.0
+
+
+def test_between_the_levels_there_is_a_step_that_a_slope_can_be_told_from_or_there_is_no_second() -> None:
+    steps_n = []
+    for k in range(400):
+        levels = Levels(known(), FORCE_N, 0.0)
+        if levels.set_second(0.05 * k):
+            steps_n.append(levels.span_n)
+    assert 100 < len(steps_n) < 350 and min(steps_n) > 0.59
+
+
 def test_no_level_is_beyond_the_rigs_largest_voltage() -> None:
     levels = Levels(known(voltage_max_v=0.5), FORCE_N, 0.0)
     assert levels.first_v == 0.5

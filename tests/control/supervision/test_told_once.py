@@ -3,7 +3,9 @@
 from types import SimpleNamespace
 from typing import Any
 
-from gateway.control.inputs import LoopInputs
+import pytest
+
+from gateway.control.inputs import LineStatus, LoopInputs
 from gateway.control.sample_conditioning import Reading
 from gateway.control.supervision.one_shot_events import OneShotEvents
 
@@ -43,3 +45,16 @@ def test_a_force_that_is_stuck_while_the_tool_pulls_has_the_sign_that_the_cell_s
     assert events.stuck_event(False, Reading(contact_n=0.0)) == ""
     events.direction = 1.0
     assert " 7.0 N" in events.stuck_event(True, Reading(contact_n=7.0))
+
+
+@pytest.mark.parametrize("voltage_v", [0.0, 0.05])
+def test_a_force_that_is_held_at_hardly_a_volt_teaches_no_pressure_per_volt(voltage_v: float) -> None:
+    """Friction may hold one there: what a sensor says of no pressure would call air missing at each later force."""
+    events, line = OneShotEvents(5.0), LineStatus(pressure_pa=5e3, pressure_pa_per_v=2e4)
+    events.observe_line(line)
+    loop: Any = SimpleNamespace(settling=SimpleNamespace(holds_force=True), voltage_v=voltage_v, unreachable=False)
+    assert events.unreachable_event(loop, 3.0, LoopInputs(0.0, STEP_S, Reading(contact_n=3.0), True, 3.0)) == ""
+    events.observe_line(line._replace(pressure_pa=8e4))
+    assert not events.lacks_air(4.0)
+    events.observe_line(line)
+    assert events.lacks_air(4.0)

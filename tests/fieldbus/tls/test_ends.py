@@ -3,13 +3,18 @@
 import ssl
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
 
+from gateway.cli.setup.certificates import make_client, store
 from gateway.fieldbus.tls_server import _utc
 from gateway.fieldbus.tls_settings import HANDSHAKE_S
+from gateway.modbus import Role
 from gateway.modbus.pdu import write_registers_request
-from tests.certificates import Folder
+from tests.certificates import DAYS, Folder, signed
 from tests.fieldbus.by_hand import READ, READ_ANSWER, framed
 from tests.fieldbus.tls.by_hand import VERSIONS, Face, Line, SocketInHand, client, face
 
@@ -79,6 +84,40 @@ def test_a_face_that_closes_begins_no_handshake(face: Face) -> None:
 def test_who_does_not_read_its_handshake_is_cut(face: Face) -> None:
     line = face.accept()
     line.stream.pause_writing()
+    assert line.socket.ended == "aborted"
+
+
+def signed_with_an_unreadable_name(path: Path) -> Folder:
+    """Return the folder of a client whose name stands there as no text, as old tools wrote Latin-1."""
+    ca, made = signed()["ca"], make_client(signed()["ca"], "cell-a", Role.SETPOINT, DAYS)
+    names = made.certificate.tbs_certificate_bytes.replace(b"\x0c\x06cell-a", b"\x13\x06cell-\xe4")
+    signature = b"\0" + ca.key.sign(names, ec.ECDSA(hashes.SHA256()))
+    ecdsa_with_sha256 = bytes.fromhex("300a06082a8648ce3d040302")
+    whole = names + ecdsa_with_sha256 + bytes((3, len(signature))) + signature
+    pem = ssl.DER_cert_to_PEM_cert(b"\x30\x82" + len(whole).to_bytes(2) + whole)
+    store({"unreadable": made, "ca": ca}, path)
+    (path / "unreadable.crt").write_text(pem)
+    return Folder(path)
+
+
+def test_who_shows_a_certificate_that_cannot_be_read_is_told_of_and_let_go(face: Face, tmp_path: Path) -> None:
+    """It would hold one of few places until its handshake had lasted too long."""
+    line = face.accept()
+    line.greet(client(signed_with_an_unreadable_name(tmp_path), "unreadable"))
+    assert line.socket.ended and not face.handshakes.pending
+    assert len(face.log) == 1 and face.log[0].startswith("W240 127.0.0.1:40000: not a certificate")
+
+
+def test_who_cannot_be_written_to_any_more_is_cut(face: Face, folder: Folder) -> None:
+    """Its answers would be nobody's, and its place be held until it has been idle for long enough."""
+
+    class Refusing:
+        def write(self, data: bytes) -> int:
+            raise ssl.SSLError(1, "[SSL] protocol is shutdown")
+
+    line = greeted(face, folder)
+    line.stream._tls = Refusing()  # type: ignore[assignment]
+    line.stream.write(framed(READ_ANSWER))
     assert line.socket.ended == "aborted"
 
 

@@ -179,4 +179,7 @@ DEFECTS = (
     Defect("what two certificates of one address are refused is told as one's", "audit/write_audit.py",
            "key = peer.identity, refusal.reason.name", "key = peer.host, refusal.reason.name",
            ("service/requests/drawn/test_drawn_requests.py",)),
+    Defect("the next process does not know of a heartbeat that was refused once", "registers/writes/admission.py",
+           "        if refused.reason is RefusalReason.HEARTBEAT_STALE and HEARTBEAT in self._offsets(write):\n",
+           "        if False:\n", ("service/running_rig/masters/drawn/test_drawn_programs.py",)),
 )  # fmt: skip

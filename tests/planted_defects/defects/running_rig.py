@@ -199,4 +199,9 @@ DEFECTS = (
     Defect("all that a rig's process has ever waited is one pause", "service/running_rig/lateness.py",
            "waited_s = min(turns.waited_s - known.waited_s, now_s - self._rig_ran_s)",
            "waited_s = min(turns.waited_s, now_s - self._rig_ran_s)", ("service/running_rig/test_lateness.py",)),
+    Defect("a run that is refused forgets that a ladder is being fitted", "service/running_rig/calibration_runs.py",
+           "if refused := self._controller.refusal_of_run(self._clock(), plan):", "if refused := \"\":",
+           ("service/running_rig/runs/test_calibration_runs.py",)),
+    Defect("control does not know that the process before has died", "service/running_rig/running_rig.py",
+           "unclean_restart=bool(cause),", "unclean_restart=False,", ("service/running_rig/test_known_everywhere.py",)),
 )  # fmt: skip

@@ -152,7 +152,9 @@ def test_coils_are_read_changed_and_written(bank, master, commands):
 
 def test_coils_meet_the_same_refusals_as_registers(bank, master):
     assert master.refusal(bank.write_bits, 4, [True], master.peer).reason is RefusalReason.UNSUPPORTED_BIT
-    assert master.refusal(bank.write_bits, 100, [False], master.peer).reason is RefusalReason.READ_ONLY
+    for coil in (100, 103):
+        refusal = master.refusal(bank.write_bits, coil, [False], master.peer)
+        assert (refusal.reason, refusal.address) == (RefusalReason.READ_ONLY, coil), "the coil, and no register"
     assert master.refusal(bank.write_bits, 15, [False, False], master.peer).reason is RefusalReason.ADDRESS
     assert master.refusal(bank.write_bits, 40001, [False], master.peer).code == 2
 

@@ -6,6 +6,7 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.registers.image import RegisterImage
+from gateway.registers.refusal import Refusal
 from gateway.registers.words import ControlBit
 from gateway.registers.writes.byte_order_echo import ByteOrderEcho
 from gateway.registers.writes.proposed_write import EdgeRefusal
@@ -234,6 +235,10 @@ def test_reserved_words_right_before_the_echo_prove_nothing(register_map):
     echo = ByteOrderEcho(register_map.find("byte_order_echo"), RegisterImage(register_map))
     assert echo.write(414, bytes(4), "10.0.0.1") is None
     assert not echo.is_proven_by("10.0.0.1")
+    for address, data in ((414, "00010000 449A5000"), (416, "449A5000 00000001")):
+        with pytest.raises(Refusal):
+            echo.write(address, bytes.fromhex(data), "10.0.0.1")
+    assert not echo.is_proven_by("10.0.0.1"), "beside a reserved word that is not 0 it proves nothing either"
     assert echo.write(414, bytes(4) + bytes.fromhex("449A5000"), "10.0.0.1") == "abcd"
 
 

@@ -7,9 +7,12 @@ import pytest
 
 from gateway import VERSION
 from gateway.audit.audit_reader import read_audit
+from gateway.codes.faults import FaultCode
+from gateway.codes.warning_bits import WarningBit
 from gateway.devices import cell_host
 from gateway.plants.in_use import in_use_facts
 from gateway.ports import PortError
+from gateway.processes.exit_cause import EndCause, Ending
 from gateway.profiles import Rig, load_rig
 from gateway.registers.refusal import Refusal
 from gateway.service.running_rig import running_rig
@@ -48,6 +51,20 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
     assert (records[0]["rig"], records[0]["version"], records[0]["after"]) == ("own", VERSION, "")
     told = [record["what"] for record in records]
     assert told == ["start", "calibration in use", "write", "plant in use", "end"]
+
+
+@pytest.mark.parametrize("restarted", [None, Ending(EndCause.MACHINE_BUSY, "anything")])
+def test_a_death_of_the_process_before_is_known_to_control_and_to_who_reads(
+    devices: OwnDevices, restarted: Ending | None
+) -> None:
+    """Masters read why the output went off, and control takes no zero of what may be left."""
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        at = {name: rig._rig.register_map.find(name).address for name in ("fault_code", "warning_word")}
+        fault, bits = (int.from_bytes(rig.bank.read_registers(address, 1), "big") for address in at.values())
+        assert (fault == FaultCode.MACHINE_BUSY) is bool(bits & WarningBit.RESTARTED) is bool(restarted)
+
+    with_running_rig(devices, scene, restarted)
 
 
 def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:

@@ -105,6 +105,10 @@ def test_behind_a_rest_the_first_reading_is_believed_whatever_was_before() -> No
     limit.take(50.0)
     limit.forget()
     assert limit.take(0.0) == 0.0
+    check = LeapCheck(0.1)
+    assert not check.passes_over(50.0, 50.0)
+    check.forget()
+    assert not check.passes_over(0.0, 0.0)
 
 
 def passed_over(*forces_n: float) -> list[bool]:

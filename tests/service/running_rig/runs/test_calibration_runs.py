@@ -220,7 +220,8 @@ def test_a_fit_that_refuses_leaves_room_for_the_next_run(tmp_path: Path, fits: F
     recorded = read_recording(fits[0]).columns["force_n"]
     assert rig.loop.decision.force_measured_n > 5.0
     assert abs(recorded[:20]).max() < 1.0 and abs(recorded[-1]) < 3.0
-    assert "being fitted" in rig.controller.refusal_of_run(rig.now(), QUICK)
+    with pytest.raises(ValueError, match="being fitted"):
+        runs.answer({"plan": SHORT})
     fits.on_result({"refused": "A332 no"})
     assert (runs.status()["phase"], runs.status()["result"]) == ("refused", {"refused": "A332 no"})
     assert rig.controller.refusal_of_run(rig.now(), QUICK) == ""

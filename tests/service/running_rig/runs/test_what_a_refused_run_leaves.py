@@ -55,6 +55,7 @@ def test_a_calibration_without_a_report_is_stored_all_the_same(tmp_path: Path) -
     rig, runs, _ = on_a_hanging_disk(tmp_path)
     runs._on_result({"stored": 7, "unreported": "E106 0007.html: No space left"})
     assert (runs.stored, runs.status()["phase"]) == (7, "stored")
+    assert rig.run(0.02).word("calibration_stored") == 7
     assert rig.log[-1] == "calibration 7 stored, not active; E106 0007.html: No space left"
     runs._on_result({"refused": "A331 no"})
     assert rig.log[-1] == "A331 no"

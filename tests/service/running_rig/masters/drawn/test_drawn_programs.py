@@ -163,14 +163,18 @@ def test_a_run_of_a_program_that_hung_begins_not_anew_behind_the_zeros_of_anothe
     assert rig.answer(0, CALIBRATE, 0, 0, 0, 4) is None, "its program goes on"
 
 
-def test_of_two_programs_on_one_host_one_that_has_just_hung_begins_nothing_behind_its_lease() -> None:
-    """The other's 0 came within the lease, and no loss was seen: it pressed once more, and its lease began anew."""
-    rig = begun()
+@pytest.mark.parametrize("cycles", [40, 1])
+def test_of_two_programs_on_one_host_one_that_has_just_hung_begins_nothing_behind_its_lease(cycles: int) -> None:
+    """The other's 0 came within the lease, and no loss was seen: it pressed once more, and its lease began anew. Behind one
+    refusal of it the next process knows of that."""
+    rig = begun(kept := dict[str, Any]())
     flow(rig, 2, lambda cycle: rig.answer(0, ENABLE, 1200, 0, 0, cycle, peer=OTHER))
     rig.run(LEASE_S - 2 * CYCLE_S).write(0, 0, peer=TWIN)
     rig.run(2 * CYCLE_S)
-    answers = flow(rig, 40, lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 1, peer=OTHER))
-    assert all(refused for (refused,) in answers) and rig.state is State.OFF
+    answers = flow(rig, cycles, lambda _: rig.answer(0, ENABLE, 1200, 0, 0, 1, peer=OTHER))
+    behind = begun(kept)
+    answers += flow(behind, cycles, lambda _: behind.answer(0, ENABLE, 1200, 0, 0, 1, peer=OTHER))
+    assert all(refused for (refused,) in answers) and {rig.state, behind.state} == {State.OFF}
 
 
 def test_who_beats_only_while_it_presses_presses_again_behind_its_own_0() -> None:
