@@ -21,4 +21,11 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(9.6263, "rival", "reset"),
         ],
     ),
+    (
+        272935,
+        [
+            Event(1.0002, "load_cell", "lost", (3.0, 0.9672), b"ST,GS,     nankg\r\n"),
+            Event(1.0389, "worker", "take", (24.76,)),
+        ],
+    ),
 ]

@@ -179,7 +179,8 @@ class OutputExchange:
             if not (self._is_behind and is_fall):
                 return
             self._give_up(self._in_flight)
-        if self._host.sign_of_life and now_s >= self._next_feed_s:
+        is_safe_next = wanted_v == self._rest_v != self._asked_v  # behind a sign of life it waited for the next tick
+        if self._host.sign_of_life and now_s >= self._next_feed_s and not is_safe_next:
             self._next_feed_s, self._free_s = now_s + self._host.feed_period_s, now_s + _AFTER_SIGN_OF_LIFE_S
             self._write(self._host.sign_of_life)
         elif wanted_v == self._refused_v and (step := self.checks.next_step(now_s)):

@@ -77,3 +77,16 @@ def test_behind_a_pause_of_the_machine_it_is_fed_once_and_not_for_each_time_that
     line.now_s += 20.0 * line.host.feed_period_s
     line.run(0.5 * line.host.feed_period_s, step_v=0.1)
     assert len(line.feeds) == fed + 1
+
+
+def test_the_safe_voltage_waits_for_no_sign_of_life(line: FedLine) -> None:
+    """As seed 272935 drew it: both were due at once, and the safe voltage went out a tick later, 40 ms at 25 Hz."""
+    line.run(0.5, step_v=0.1)
+    while line.exchange.unanswered_since_s is not None:
+        line.run(ROUND_TRIP_S, step_v=0.0)
+    line.now_s += 1.01 * line.host.feed_period_s
+    line.written.clear()
+    line.exchange.set_voltage(0.0, line.now_s)
+    assert [data for _, data in line.written] == [line.host.request(SetVoltage(0.0))]
+    line.run(3 * ROUND_TRIP_S, step_v=0.0)
+    assert line.written[1][1] == FEED
