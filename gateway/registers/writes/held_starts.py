@@ -152,7 +152,7 @@ class HeldEnables:
         self.note_refused_beat(host, frame)
         known = frame.heartbeat if frame.heartbeat is not None else before.heartbeat if before else standing
         moves = self.frames.moves_so_far
-        sent = _sent_alike(before.sent if before else {}, frame, moves)
+        sent = _sent_with(before.sent if before else {}, frame, moves)
         beats = frame.heartbeat is not None or bool(before and before.beats)
         keep_latest(self._refused, (host, frame.tares), _Refused(frame, known, beats, now_s, sent, moves))
         if frame.tares and self.has_beaten(host):
@@ -163,7 +163,9 @@ class HeldEnables:
         since it came last."""
         sent = of_frame(refused.sent, frame.channel)
         moves = sent.moves if sent else refused.moves
-        if frame.heartbeat is not None:  # the same bytes by another connection of a pool are of the same program
+        if frame.heartbeat is not None or not frame.tares:
+            # The same bytes by another connection of a pool are of the same program. Tares of two programs are alike, too, as
+            # far as they bring no heartbeat: there a connection stands for its program.
             moves = max([moves, *(other.moves for other in refused.sent.values() if other.data == frame.data)])
         if not self._stands(host, frame, moves):
             return False
@@ -225,7 +227,7 @@ class HeldEnables:
             return False
         if refused.beats:  # else nobody knows of a program: the next process asks none for a heartbeat
             self.note_lost(host, refused.heartbeat)
-        sent = _sent_alike(refused.sent, frame, self.frames.moves_so_far)
+        sent = _sent_with(refused.sent, frame, self.frames.moves_so_far)
         self._refused[key] = refused._replace(at_s=now_s, sent=sent)
         return True
 
@@ -310,13 +312,11 @@ class HeldEnables:
         self.by_host.update((host, now_s) for host, held_s in held.items() if 0.0 <= now_s - held_s < _HELD_S + _DOWN_S)
 
 
-def _sent_alike(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
-    """Return what the latest frames of a host have sent, with this one: by whichever connection of a pool the same bytes came
-    (tares of two programs are alike, too: there a connection stands for its program). Of too many the oldest of the same bytes
-    goes first: beside a program that connects anew for each frame another one's last frame is not forgotten."""
-    alike = [channel for channel, other in sent.items() if other.data == frame.data and not frame.tares]
-    known = {**sent, **dict.fromkeys((*alike, frame.channel), _Sent(frame.data, moves))}
-    known[frame.channel] = known.pop(frame.channel)  # the latest is the last
+def _sent_with(sent: dict[Channel, _Sent], frame: StartFrame, moves: int) -> dict[Channel, _Sent]:
+    """Return what the latest frames of a host have sent, with this one. Of too many the oldest of the same bytes goes first:
+    beside a program that connects anew for each frame another one's last frame is not forgotten."""
+    known = {channel: other for channel, other in sent.items() if channel != frame.channel}
+    known[frame.channel] = _Sent(frame.data, moves)  # the latest is the last
     if len(known) > defaults.MOST_FRAMES:
         each = [other.data for other in known.values()]
         del known[next((channel for channel, other in known.items() if each.count(other.data) > 1), next(iter(known)))]

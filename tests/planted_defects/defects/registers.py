@@ -155,7 +155,7 @@ DEFECTS = (
            "self._refused[host, False] = refused._replace(is_let_go=True)", "del self._refused[host, False]",
            ("registers/test_held_starts.py",)),
     Defect("behind such a 0 one of its frames alone is known", "registers/writes/held_starts.py",
-           "_sent_alike(before.sent if before else {}, frame", "_sent_alike({}, frame",
+           "_sent_with(before.sent if before else {}, frame", "_sent_with({}, frame",
            ("registers/test_held_starts.py",)),
     Defect("a program that connects anew for each frame has another one's forgotten", "registers/writes/held_starts.py",
            "if each.count(other.data) > 1)", "if not each)", ("registers/test_held_starts.py",)),

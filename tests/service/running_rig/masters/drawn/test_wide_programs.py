@@ -4,13 +4,14 @@ from typing import Any
 
 import pytest
 
+from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.registers.words import State
 from tests.service.running_rig.masters.drawn.laws import LEASE_S
 from tests.service.running_rig.masters.drawn.test_drawn_programs import STEPS, begun
 from tests.service.running_rig.masters.drawn.wide_scene import WideScene
-from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, TARE
+from tests.service.running_rig.simulated_rig import CALIBRATE, ENABLE, OTHER, OWNER, TAKE, TARE
 
 SEEDS = 50000, 50100, 50200, 50300, 50400, 50500, 61046, 61089, 61412, 63047, 64074, 66800
 
@@ -161,3 +162,18 @@ def test_behind_a_standstill_a_program_that_hung_does_not_undo_the_0_of_another_
     rig.run(0.2).ticks += 100
     refused = rig.run(0.2).answer(0, ENABLE, 1200, 0, 0, 7, peer=OTHER)
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE and rig.state is State.OFF
+
+
+def test_what_hung_takes_nothing_over_by_a_connection_of_its_pool_that_had_brought_another_word() -> None:
+    """By that one its last word was older than its last heartbeat, and the takeover that was refused came by the other one."""
+    rig = begun()
+    first, second = (Peer(OTHER.host, port) for port in (4002, 4003))
+    rig.write(0, TAKE)
+    rig.wire.fault = FaultCode.OUTPUT_LOST
+    for beat, peer, word in ((21, first, ENABLE), (22, second, ENABLE), (23, second, ENABLE | TAKE)):
+        assert rig.run(0.05).answer(4, beat, peer=peer) and rig.answer(0, word, peer=peer)
+    rig.wire.fault = FaultCode.NONE
+    for peer in (second, first, first):
+        rig.run(0.1).answer(4, 23, peer=second)
+        assert rig.answer(0, ENABLE | TAKE, peer=peer)
+    assert rig.bank.owner == OWNER.host

@@ -135,16 +135,19 @@ class WideScene(Scene):
     def stand_still(self, ticks: int, *, is_suspended: bool) -> None:
         """The process does not come by; suspended, its clock does not go on either."""
         self.dies_behind = 0  # who wakes and dies at once has told the next process nothing
-        rig, before = self.rig, self.rig.ticks
+        rig, before, began_s = self.rig, self.rig.ticks, self.rig.now()
         waits = {
             id(program): self.draw.random() < 0.5 for program in self.programs
         }  # for an answer, before it writes on
         sent: Pile = []
+        cut = set[str]()
         for _ in range(ticks):
             for program in self.programs:
                 for frame in program.due(rig.ticks):
                     if program.asks and not (waits[id(program)] and any(p is program for p, *_ in sent)):
                         sent.append((program, frame, program.asks, program._beat))
+                    elif program.is_live:  # leaves out the rest of its cycle, its heartbeat, too
+                        cut.add(program.identity)
             rig.ticks += 1
             rig.plant.advance(rig.wire.voltage_v, 10)
         self.told[-1] += f" {ticks} ({len(sent)} wait)"
@@ -152,6 +155,10 @@ class WideScene(Scene):
             rig.ticks, rig.suspended_s = before, rig.suspended_s + ticks * TICK_S
             for program in self.programs:
                 program._due, program._next = program._due - ticks, program._next - ticks
+        for host, moved_s in self.moved_s.items():
+            if began_s - moved_s <= self.longest_s(host):  # what waits was sent then, and counts
+                self.moved_s[host] += rig.now() - began_s
+        self.moved_s.update(dict.fromkeys(cut, rig.now()))
         self.deliver(sent)
         for program in self.programs:
             program.begin_anew()
