@@ -111,6 +111,15 @@ def test_a_gateway_that_ends_over_a_question_is_told_as_one_that_is_gone(
     assert told in str(caught.value) and caught.value.exit_code == exit_codes.DEVICE
 
 
+def test_a_state_directory_that_no_socket_fits_in_is_told_as_such(tmp_path: Path) -> None:
+    """Its gateway runs, and says so at its start: whoever asked it was told that there is perhaps none (E140)."""
+    with pytest.raises(
+        CliError, match=r"E152 .* bytes of path, a socket takes 107: give a shorter --state DIR"
+    ) as caught:
+        control_socket.ask(tmp_path / ("x" * 107), {"do": "running"})
+    assert caught.value.exit_code == exit_codes.DEVICE and "is it running" not in str(caught.value)
+
+
 def test_a_gateway_of_another_user_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: Any) -> dict[str, Any]:
         raise PermissionError(13, "Permission denied")
