@@ -53,6 +53,20 @@ def test_another_ones_job_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> 
     assert ask_until_done(Path(), "calibration", {"use": 2})["job"] == 2
 
 
+def test_a_change_is_told_its_own_end_though_another_ones_came_behind_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rollback that failed beside a `calibration use 1` said that 1 was in use, and ended with 0."""
+    own, other = {"said": "E433 nothing to go back to", "failed": True}, {"said": "1 in use", "failed": False}
+    later = {"busy": False, "job": 2, "ends": {"1": own, "2": other}, **other}
+    answers = iter(
+        [{"busy": True, "job": 1, "ends": {}}, later, {"busy": True, "job": 1}, later | {"ends": {"2": other}}]
+    )
+    monkeypatch.setattr(change_in_use, "ask", lambda directory, request: next(answers))
+    answer = ask_until_done(Path(), "calibration", {"rollback": True})
+    assert (answer["said"], answer["failed"]) == (own["said"], True) and "ends" not in answer
+    with pytest.raises(NoAnswerError, match=r"E140 the gateway no longer knows how it went"):
+        ask_until_done(Path(), "calibration", {"rollback": True})
+
+
 def test_a_change_without_an_end_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(change_in_use, "_PATIENCE_S", 0.05)
     monkeypatch.setattr(change_in_use, "ask", lambda directory, request: {"busy": True, "job": 1})
