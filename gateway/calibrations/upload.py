@@ -25,7 +25,7 @@ from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer
 from gateway.numbered_documents.store import SelectedDocument, StoreError
 from gateway.plain_file import tell_place_and_refusal
-from gateway.processes.disk_worker import DiskWorker, Done, Work
+from gateway.processes.disk_worker import DiskWorker, Done, Work, keep_end
 from gateway.registers.map.register_map import RegisterMap
 from gateway.registers.refusal import Refusal
 from gateway.registers.upload.coefficients import HEAD_WORDS
@@ -89,6 +89,7 @@ class UploadService:
         self._notice = NO_NOTICE
         self._jobs = 0
         self._outcome, self._failed_last, self._reason = "", False, 0
+        self._ends: dict[str, dict[str, Any]] = {}
         staging.on_commit = self._on_commit
         staging.on_select = self._on_select
 
@@ -160,7 +161,8 @@ class UploadService:
         return self._ask("calibration rollback", self._activation.roll_back)
 
     def status(self) -> dict[str, Any]:
-        """Return what is in use, and how the last job went; job is its number; reason as failing_reason."""
+        """Return what is in use, and how the last job went; job is its number; reason as failing_reason. ends: of the jobs
+        before as well."""
         return {
             "active": self._calibration.number,
             "name": self._calibration.name,
@@ -171,6 +173,7 @@ class UploadService:
             "said": self._outcome,
             "failed": self._failed_last,
             "reason": self._reason,
+            "ends": self._ends,
         }
 
     def _ask(self, what: str, work: Work) -> dict[str, Any]:
@@ -224,6 +227,7 @@ class UploadService:
     def _end(self, status: CommitStatus, sentence: str, index: int = 0, reason: int = 0) -> None:
         self._doing, self._outcome, self._reason = "", sentence, reason
         self._failed_last = status is CommitStatus.FAILED
+        keep_end(self._ends, self._jobs, said=sentence, failed=self._failed_last, reason=reason)
         if self._shows:
             self._staging.show_commit(status, index, reason, self._notice)
         self._log("calibration", sentence)

@@ -28,6 +28,7 @@ def ask_until_done(directory: Path, verb: str, request: dict[str, Any]) -> dict[
                 raise disk_hangs(f"the gateway has not answered for {_PATIENCE_S:g} s")
             time.sleep(_POLL_S)
             answer = ask(directory, {"do": verb})
+        answer |= _own_end(answer.pop("ends", None), str(job["job"]))
     except CliError as error:
         if not (is_asked or isinstance(error, NoAnswerError)):
             if error.exit_code != exit_codes.DEVICE:
@@ -38,6 +39,14 @@ def ask_until_done(directory: Path, verb: str, request: dict[str, Any]) -> dict[
         unknown = f"it may make the change all the same: force-gateway {verb} list shows what is in use"
         raise NoAnswerError(f"{error}; {unknown}", error.exit_code) from None
     return answer
+
+
+def _own_end(ends: dict[str, dict[str, Any]] | None, job: str) -> dict[str, Any]:
+    """Return how our job went: another one may have ended since, and what was said last is of that. ends: None from a gateway
+    of before, which tells of the last one alone."""
+    if ends is not None and job not in ends:
+        raise NoAnswerError("E140 the gateway no longer knows how it went, for many others have changed it since")
+    return ends[job] if ends else {}
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from gateway.cli.errors import CliError, NoAnswerError
 from gateway.processes import exit_codes
-from gateway.processes.json_socket.messages import LONGEST_ANSWER
+from gateway.processes.json_socket.messages import LONGEST_ANSWER, why_path_too_long
 from gateway.processes.state_directory import CONTROL_SOCKET
 
 _TIMEOUT_S: Final = 2.0
@@ -20,6 +20,8 @@ def ask(state: Path, request: dict[str, Any], socket_name: str = CONTROL_SOCKET)
     """Return the answer of the gateway that runs on this state directory; CliError when there is none or it refuses, and as
     NoAnswerError where it was there and may have done what it was asked for."""
     path = state / socket_name
+    if why := why_path_too_long(path):  # a gateway may run there, which has said the same at its start
+        raise CliError(f"E152 {path} is served by no gateway: {why}, to it and here", exit_codes.DEVICE)
     kind = CliError
 
     def note_asked() -> None:

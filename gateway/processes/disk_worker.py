@@ -24,6 +24,14 @@ THREAD_NAME = "disk"
 """How the names of these threads begin, for whoever looks at the process."""
 
 _LOOP_WAITS_S: Final = 200e-6
+_MOST_ENDS: Final = 8
+
+
+def keep_end(ends: dict[str, dict[str, Any]], job: int, **how: Any) -> None:
+    """Keep how a job ended, by its number as JSON has it, of the last eight: who began it asks again in a while, and by then
+    another one's may have ended, too."""
+    ends[str(job)] = how
+    ends.pop(str(job - _MOST_ENDS), None)
 
 
 class DiskWorker:

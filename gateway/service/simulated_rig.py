@@ -203,11 +203,10 @@ async def _serve_process(rig: Rig, link: socket.socket, kept: KeptSettings, log:
 
 def main(arguments: list[str]) -> int:
     """Run the simulated rig; return its exit code. arguments: descriptor of the link, options as JSON."""
-    link = socket.socket(fileno=int(arguments[0]))
     options = json.loads(arguments[1])
     state = Path(options["state"])
     priority.set_nice(priority.RIG_NICE)
-    with EventLog(source="rig", file=EventFile(state)) as log:
+    with socket.socket(fileno=int(arguments[0])) as link, EventLog(source="rig", file=EventFile(state)) as log:
         kept = KeptSettings(state, options.get("run", ""))
         try:
             rig = kept_rig(options["rig"], simulated=options["simulate"], memory=options.get("kept_rig"))

@@ -130,6 +130,18 @@ def test_going_back_twice_goes_forth_again(filled):
     assert filled.restarted().active_words == filled.active_words
 
 
+def test_how_a_change_went_is_known_behind_another_ones_and_of_the_last_eight(bench):
+    """Who asks how its rollback went was told of the change of another one that had ended behind it."""
+    job = bench.upload.rollback()["job"]
+    bench.run()
+    own = bench.upload.status()["said"]
+    for others in range(1, 10):
+        bench.upload.use(1)
+        bench.run()
+        assert bench.upload.status()["ends"].get(str(job), {}).get("said") == (own if others < 8 else None)
+    assert own.startswith("E433 ") and len(bench.upload.status()["ends"]) == 8
+
+
 def test_going_back_from_the_first_upload_leads_to_the_rigs_own(bench):
     bench.upload_of(calibration(10), 1)
     bench.upload.rollback()

@@ -53,6 +53,20 @@ def test_another_ones_job_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> 
     assert ask_until_done(Path(), "calibration", {"use": 2})["job"] == 2
 
 
+def test_a_change_is_told_its_own_end_though_another_ones_came_behind_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A rollback that failed beside a `calibration use 1` said that 1 was in use, and ended with 0."""
+    own, other = {"said": "E433 nothing to go back to", "failed": True}, {"said": "1 in use", "failed": False}
+    later = {"busy": False, "job": 2, "ends": {"1": own, "2": other}, **other}
+    answers = iter(
+        [{"busy": True, "job": 1, "ends": {}}, later, {"busy": True, "job": 1}, later | {"ends": {"2": other}}]
+    )
+    monkeypatch.setattr(change_in_use, "ask", lambda directory, request: next(answers))
+    answer = ask_until_done(Path(), "calibration", {"rollback": True})
+    assert (answer["said"], answer["failed"]) == (own["said"], True) and "ends" not in answer
+    with pytest.raises(NoAnswerError, match=r"E140 the gateway no longer knows how it went"):
+        ask_until_done(Path(), "calibration", {"rollback": True})
+
+
 def test_a_change_without_an_end_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(change_in_use, "_PATIENCE_S", 0.05)
     monkeypatch.setattr(change_in_use, "ask", lambda directory, request: {"busy": True, "job": 1})
@@ -109,6 +123,15 @@ def test_a_gateway_that_ends_over_a_question_is_told_as_one_that_is_gone(
             control_socket.ask(Path(), {"do": "running"})
         thread.join()
     assert told in str(caught.value) and caught.value.exit_code == exit_codes.DEVICE
+
+
+def test_a_state_directory_that_no_socket_fits_in_is_told_as_such(tmp_path: Path) -> None:
+    """Its gateway runs, and says so at its start: whoever asked it was told that there is perhaps none (E140)."""
+    with pytest.raises(
+        CliError, match=r"E152 .* bytes of path, a socket takes 107: give a shorter --state DIR"
+    ) as caught:
+        control_socket.ask(tmp_path / ("x" * 107), {"do": "running"})
+    assert caught.value.exit_code == exit_codes.DEVICE and "is it running" not in str(caught.value)
 
 
 def test_a_gateway_of_another_user_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,16 @@
 """Requests and answers of a local socket as JSON: what is too large to be looked at, and what has no number in JSON."""
 
 import json
+import os
 import re
 from math import isfinite
+from pathlib import Path
 from typing import Any, Final
 
 Answer = dict[str, Any]
 LONGEST_ANSWER: Final = 1 << 20
 """Bytes of an answer: more are none of ours."""
+_LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
 _LONGEST_SENTENCE: Final = 500
 _DEEPEST: Final = 10
 _DEEPEST_READ: Final = 100  # lists and objects inside of each other; the reader has room for ten times as many
@@ -17,6 +20,14 @@ _LONGEST_KEY: Final = 100
 _MOST_VALUES: Final = 3000
 _MOST_DIGITS: Final = 600  # in a row; the longest Modbus request in hex has 506
 _DIGITS_AS_ZEROS: Final = bytes.maketrans(b"123456789", b"000000000")
+
+
+def why_path_too_long(path: Path) -> str:
+    """Return why no socket can be at this path, with the cure; empty where one can."""
+    length = len(os.fsencode(path))
+    return f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR" * (
+        length > _LONGEST_PATH
+    )
 
 
 def error_answer(sentence: str) -> Answer:

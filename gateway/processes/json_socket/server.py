@@ -32,12 +32,12 @@ from gateway.processes.json_socket.messages import (
     has_huge_number,
     load_shallow,
     refuse_constant,
+    why_path_too_long,
     why_too_large,
 )
 
 Handler = Callable[[dict[str, Any]], Answer | Future[Answer]]
 """A future, done in the loop, is for what waits for a disk."""
-_LONGEST_PATH: Final = 107  # bytes, of a Unix socket's address
 _SHARE: Final = 0.1  # of the loop's time
 _LONGEST_REST_S: Final = 0.5
 _NO_DESCRIPTOR_S: Final = 0.1
@@ -77,8 +77,7 @@ class JsonLineServer:
     async def start(self) -> str:
         """Begin to serve; empty, or a sentence that says why nothing is served: tried again, but for a path that is too
         long, until `close`."""
-        if (length := len(os.fsencode(self._path))) > _LONGEST_PATH:
-            why = f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR"
+        if why := why_path_too_long(self._path):
             return self._unserved(why)
         self.loop, self._is_serving = asyncio.get_running_loop(), True
         try:

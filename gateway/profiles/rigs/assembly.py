@@ -69,12 +69,14 @@ class Report:
 def check_report(name: str | Path, *, simulated: bool = False) -> Report:
     """Read and check a rig, by shipped name or path. Never raises for what is in a file.
 
-    simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then.
+    simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then. One whose file says so itself
+    serves its masters on the ports that it names, and those are judged as ever.
     """
     findings = Findings()
     opened = open_profile("rig", refer_to(name), findings)
     rig = _rig(opened[0], opened[1], findings) if opened else None
-    faults = findings.faults + ([] if simulated else findings.hardware)
+    needs_no_port = simulated and not (rig and rig.simulated)
+    faults = findings.faults + ([] if needs_no_port else findings.hardware)
     if rig and simulated:
         rig = replace(rig, notes=(*rig.notes, *_left_to_edit(findings))).as_simulated()
     return Report(_in_order(faults), _in_order(findings.warnings), None if faults else rig)

@@ -14,7 +14,7 @@ from gateway.numbered_documents.store import StoreError
 from gateway.plain_file import tell_place_and_refusal
 from gateway.plants.in_use import with_plant_in_use
 from gateway.plants.store import PlantStore
-from gateway.processes.disk_worker import DiskWorker, Done, Work
+from gateway.processes.disk_worker import DiskWorker, Done, Work, keep_end
 from gateway.profiles import Rig
 from gateway.profiles.rigs.compensated_effects import compensation_words
 from gateway.service.socket_requests import PlantRequest, parse_request
@@ -48,6 +48,7 @@ class RigPlants:
         self.run_in_background: Callable[[Work, Done], None] = self._thread
         self._waiting: Rig | None = None
         self._doing, self._outcome, self._has_failed, self._jobs = "", "", False, 0
+        self._ends: dict[str, dict[str, Any]] = {}
         self._since_s = 0.0
 
     def serve(self, edges: PlantEdges) -> None:
@@ -72,7 +73,8 @@ class RigPlants:
         return self.status()
 
     def status(self) -> dict[str, Any]:
-        """Return number and name of the plant in use, since when (monotonic s), which one waits, and how the last job went."""
+        """Return number and name of the plant in use, since when (monotonic s), which one waits, and how the last job went.
+        ends: of the jobs before as well."""
         in_use, waiting = self.rig.plant_in_use, self._waiting
         return {
             "active": in_use.number if in_use else 0,
@@ -83,6 +85,7 @@ class RigPlants:
             "busy": bool(self._doing),
             "said": self._outcome,
             "failed": self._has_failed,
+            "ends": self._ends,
         }
 
     def take_waiting(self) -> None:
@@ -113,6 +116,7 @@ class RigPlants:
             doubts = result.plant_in_use.doubts if result.plant_in_use else ""
             words = (f"{_plant(result)} {when}", *compensation_words(result.compensation), doubts)
             self._outcome = "; ".join(filter(None, words))
+        keep_end(self._ends, self._jobs, said=self._outcome, failed=self._has_failed)
         if self._has_failed:
             self._edges.on_failure(doing, self._outcome)
         self._edges.log("plant", f"{doing}: {self._outcome}")

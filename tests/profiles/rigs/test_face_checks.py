@@ -76,6 +76,16 @@ def test_two_names_of_one_port_are_one_port(tmp_path: Path) -> None:
     assert fault.startswith("fieldbus[1].port: is the port of fieldbus[0] too")
 
 
+def test_faces_of_a_rig_that_is_simulated_by_its_file_are_judged_with_sim_too(tmp_path: Path) -> None:
+    """They are real ports, for --sim changes nothing of such a rig: two on one were told to stop "this very process" (E103)."""
+    path = tmp_path / "rig.yaml"
+    demo = (RIGS / "demo.yaml").read_text(encoding="utf-8")
+    path.write_text(f"{demo}\nfieldbus: [{GOOD}, {GOOD}]\n", encoding="utf-8")
+    (fault,) = messages(check_report(path, simulated=True).faults)
+    assert fault.startswith("fieldbus[1].port: is the port of fieldbus[0] too")
+    assert report(tmp_path, f"[{GOOD}, {GOOD}]", simulated=True).faults == ()  # a cell's own ports are left alone
+
+
 def test_a_rig_needs_some_face(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(CELL.replace("  bind:", "  plain: false\n  bind:"), encoding="utf-8")

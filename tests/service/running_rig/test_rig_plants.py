@@ -97,6 +97,7 @@ def test_a_rollback_does_not_go_to_a_plant_that_waited_and_was_never_in_use(edge
     assert edges.plants.status()["active"] == 0, "the rig's own, as before"
     edges.plants.answer({"rollback": True})
     assert edges.plants.status()["active"] == 2
+    assert list(edges.plants.status()["ends"]) == ["1", "2", "3", "4"], "each is told its own, whoever comes behind it"
 
 
 def test_one_change_at_a_time(edges: Edges) -> None:
