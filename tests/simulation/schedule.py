@@ -90,7 +90,7 @@ class Simulation:
         self.rates: dict[str, int] = {}
         self.clock, self.chance = VirtualClock(), Random(~seed)
         self.observer = drawn.observer()
-        self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL
+        self.observer.history.is_plain = rig.load_cell.device.name == DEMO_CELL and not rig.compensation.cell
         self.observer.history.has_valve = rig.valve is not None or rig.load_cell.sign < 0
         self.outside = VirtualLoop(self.clock, has_tasks=False)
         self.outside.set_exception_handler(self._on_error)

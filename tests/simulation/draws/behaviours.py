@@ -11,7 +11,7 @@ from random import Random
 from tests.simulation.draws.event import Event
 from tests.simulation.masters.spelling import coil_pdu, coils_pdu, floats_pdu, mask_pdu, write_one_pdu, write_pdu
 
-SHARE, CROWD_SHARE, REFUSED_SHARE, FRAMES_SHARE = 0.24, 0.03, 0.15, 0.1
+SHARE, CROWD_SHARE, REFUSED_SHARE, FRAMES_SHARE, PATH_SHARE = 0.24, 0.03, 0.15, 0.1, 0.1
 STOPS = (
     write_one_pdu(0, 0),
     write_pdu(0, 0),
@@ -126,6 +126,23 @@ def draw_frames(seed: int) -> Iterator[Event]:
     if dies:
         at_s += chance.choice((0.1, 0.3, 1.0)) * chance.uniform(0.5, 1.5) + (dies == "power_cut")
         yield Event(round(at_s, 4), "machine", dies, (0.1, 0.0))
+
+
+def draw_paths(seed: int) -> Iterator[Event]:
+    """A master writes a path of forces, stops at once now and then, and goes on."""
+    chance = Random(f"path {seed}")
+    if chance.random() > PATH_SHARE:
+        return
+    whom, at_s = chance.choice(("worker", "rival")), chance.uniform(0.5, 12.0)
+    yield _command(chance, round(at_s, 4), whom)
+    for _ in range(chance.randrange(1, 4)):
+        at_s += chance.uniform(0.3, 2.0)
+        mean_n, share = chance.uniform(6.0, 40.0), chance.choice((0.05, 0.3, 0.9))
+        numbers = (mean_n, share * min(mean_n, 55.0 - mean_n), chance.choice((0.4, 1.0, 4.0, 12.0)))
+        yield Event(round(at_s, 4), whom, "follow", tuple(round(number, 2) for number in numbers))
+        at_s += chance.uniform(0.5, 3.0)
+        if chance.random() < 0.5:
+            yield Event(round(at_s, 4), whom, "hold", (round(chance.uniform(*FORCE_N), 2),))
 
 
 def _stop(chance: Random, at_s: float) -> Iterator[Event]:

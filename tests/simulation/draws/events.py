@@ -8,7 +8,7 @@ from heapq import merge
 from operator import attrgetter
 from random import Random
 
-from tests.simulation.draws.behaviours import draw_behaviours, draw_frames, draw_refused
+from tests.simulation.draws.behaviours import draw_behaviours, draw_frames, draw_paths, draw_refused
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.rare_events import LADDER_S, draw_jam, draw_ladder, draw_rare_events
 from tests.simulation.draws.sequences import draw_sequences
@@ -57,7 +57,7 @@ def draw_events(seed: int, duration_s: float) -> Iterator[Event]:
     """What happens, in its order: a little more than two events a second, and what is rare (rare_events.py,
     sequences.py)."""
     usual = merge(draw_usual(Random(seed), duration_s), draw_rare_events(seed, duration_s), key=attrgetter("at_s"))
-    more = (draw(seed) for draw in (draw_jam, draw_sequences, draw_behaviours, draw_refused, draw_frames))
+    more = (draw(seed) for draw in (draw_jam, draw_sequences, draw_behaviours, draw_refused, draw_frames, draw_paths))
     usual = merge(usual, *more, key=attrgetter("at_s"))
     ladder = tuple(draw_ladder(seed))
     quiet_s = LADDER_S if ladder else 0.0  # nearly everything else would end it

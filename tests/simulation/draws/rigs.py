@@ -17,6 +17,7 @@ from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig, load_device, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
 from gateway.profiles.rigs.assembly import check_report
+from gateway.profiles.rigs.compensated_effects import compensation_of, in_simulation, without_compensable
 from gateway.profiles.rigs.faces import RtuFace
 from gateway.profiles.rigs.rig import ValveLine
 from gateway.twin.plant import with_value
@@ -80,6 +81,19 @@ OWN_BOUNDS: tuple[dict[str, Any], ...] = (
 BUS_TOO_SHARE = 0.2
 """Of rigs that have something else of their own."""
 BOW = 0.005
+OWN_EFFECTS = (
+    ("cell", "quadratic_per_n", 0.002),
+    ("cell", "cubic_per_n2", 5.0e-5),
+    ("cell", "crosstalk_n_per_v", 0.4),
+    ("cell", "zero_n_per_k", 0.15),
+    ("regulator", "command_bow", 0.06),
+    ("regulator", "command_s", 0.05),
+    ("regulator", "delay_s", 0.05),
+    ("regulator", "second_lag_s", 0.1),
+)
+"""What the plant of a rig of its own has more of than its calibration was made with, at most: control takes it back."""
+LONGER = "delay_s", "second_lag_s"
+"""Of these, what is never less."""
 RIG = """name: pair
 plant: paper-slide
 calibration: demo
@@ -158,6 +172,9 @@ def draw_rig(seed: int) -> Drawn:
         rig = replace(rig, fieldbus=(RtuFace(type="rtu", port="bus"),))
     if own:
         rig = _with_own(rig, kind, own)
+    if own and kind == "plain":
+        rig = _with_effects(rig, own)
+        loop_hz = own.choice((loop_hz, LEAST_HZ))
     cell_hz = share * loop_hz
     rig = _varied(_resting(rig, Random(f"safe {seed}")), Random(f"varied 2 {seed}"))
     device = rig.load_cell.device
@@ -180,6 +197,19 @@ def _with_own(rig: Rig, kind: str, chance: Random) -> Rig:
     network = replace(rig.network, **chance.choice(OWN_BOUNDS))
     faces = tuple(RtuFace(type="rtu", port=bus) for bus in buses)
     return replace(rig, network=network, fieldbus=faces)
+
+
+def _with_effects(rig: Rig, chance: Random) -> Rig:
+    """In these, the plant has one to three effects of which control knows, and the lags are those of the rig's file."""
+    assert rig.plant_profile
+    base = plant = rig.plant_profile.plant
+    for section, name, most in chance.sample(OWN_EFFECTS, chance.choice((1, 1, 2, 3))):
+        more = most * chance.uniform(0.2, 1.0) * (1 if name in LONGER else chance.choice((1, -1)))
+        plant = with_value(plant, section, name, getattr(getattr(plant, section), name) + more)
+    compensation = in_simulation(compensation_of(without_compensable(base), plant))
+    control = replace(rig.control, response=ResponseSource.RIG)
+    profile = replace(rig.plant_profile, plant=plant)
+    return replace(rig, plant_profile=profile, compensation=compensation, control=control)
 
 
 def _resting(rig: Rig, chance: Random) -> Rig:

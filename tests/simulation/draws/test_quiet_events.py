@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from tests.simulation.draws.behaviours import draw_paths
 from tests.simulation.draws.event import Event
 from tests.simulation.draws.quiet_events import BEGUN, BLOWS, BY_MASTERS, BY_PEOPLE, EVERY, QUIET, draw_quiet_events
 from tests.simulation.draws.rigs import draw_rig
@@ -35,6 +36,13 @@ def test_there_are_rigs_with_two_buses_and_with_little_room_for_masters() -> Non
         25.0,
         200.0,
     }
+
+
+def test_there_are_rigs_whose_plant_has_more_than_their_calibration_and_masters_that_write_a_path() -> None:
+    compensations = [draw_rig(seed).rig.compensation for seed in SEEDS]
+    assert {bool(one.cell) for one in compensations} == {bool(one.command) for one in compensations} == {True, False}
+    drawn = [event for seed in range(PUSH_SEEDS) for event in draw_paths(seed)]
+    assert {event.what for event in drawn} == {"take", "follow", "hold"}
 
 
 def test_a_kept_schedule_has_the_machine_that_it_was_found_on() -> None:

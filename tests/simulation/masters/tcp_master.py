@@ -6,6 +6,7 @@ They spell frames themselves. Each checks its own answers: the right transaction
 import struct
 from collections import deque
 from collections.abc import Callable
+from math import pi, sin
 from typing import NamedTuple
 
 from tests.simulation.kernel.network import Caller, Line
@@ -38,6 +39,7 @@ STOPS = frozenset(
     (write_one_pdu(0, 0), write_pdu(0, 0), coil_pdu(0, on=False), coils_pdu(0, 0, 1), mask_pdu(0, 0xFFFE, 0))
 )
 READS = frozenset((read_pdu(100, 20), read_pdu(102, 1), read_pdu(0, 13)))
+PATH_S = 0.04
 RESET_S = 0.3
 """Until what a reset has changed is seen: some ticks."""
 
@@ -199,6 +201,19 @@ class Master:
         """Command by the whole block from now on."""
         self.hold(force_n, ENABLE)
         self._wish = self._wish._replace(program=tuple(map(int, numbers)))
+
+    def follow(self, mean_n: float, swing_n: float, period_s: float) -> None:
+        """Command a force that swings about its mean, as a robot on a path does: 25 setpoints a second."""
+        self.hold(mean_n)
+        self._write_path(self._beating, mean_n, swing_n, 2.0 * pi * PATH_S / period_s, 1)
+
+    def _write_path(self, number: int, mean_n: float, swing_n: float, step: float, place: int) -> None:
+        if number == self._beating and not self._is_hung:
+            self._beat += 1
+            self._wish = self._wish._replace(force_n=mean_n + swing_n * sin(step * place), beat=self._beat)
+            for pdu in self._way.begin(self._wish):
+                self.ask(pdu)
+            self._outside.call_later(PATH_S, self._write_path, number, mean_n, swing_n, step, place + 1)
 
     def hang(self, beat_beside: float = 0.0) -> None:
         """Go on with the last frame, whose heartbeat stays as it was. beat_beside: heartbeat of another frame of its own, which
