@@ -156,4 +156,11 @@ DEFECTS = (
     Defect("a rig that says nothing of it holds a lost master's force", "control/settings.py",
            "lease_action: LeaseAction = LeaseAction.FAULT", "lease_action: LeaseAction = LeaseAction.HOLD",
            ("profiles/rigs/test_shipped_bounds.py",)),
+    Defect("the way to 0 behind a run needs a master", "control/controller.py",
+           "        return self.active_run.is_local or (self._machine.state is _RUNNING and not self.active_run.running)",
+           "        return self.active_run.is_local",
+           ("control/runs/test_lost_in_a_ladder.py",)),
+    Defect("readings of two values are remembered over a rest", "control/supervision/leaping_readings.py",
+           "        self._limit.forget()\n        self._said_n.clear()\n", "        self._limit.forget()\n",
+           ("control/supervision/readings/test_leaping_readings.py",)),
 )  # fmt: skip
