@@ -176,4 +176,11 @@ DEFECTS = (
     Defect("a lack of air never lasts", "control/supervision/stuck_sensor.py",
            "self._airless_s + reading.interval_s if", "reading.interval_s if",
            ("control/supervision/first_rise/test_late_machines.py",)),
+    Defect("a fault takes the words of what an item has failed by", "control/self_test/items.py",
+           "        if item and verdict_of(found, item) is not FAILED:", "        if item:",
+           ("control/self_test/test_verdicts.py",)),
+    Defect("a cell that was calibrated as quiet fails by its next noise", "control/self_test/judgement.py",
+           "        fails_n = max(NOISE_FAILS * known.noise_n, _TOLERANCE_FAILS * tolerance_n)",
+           "        fails_n = NOISE_FAILS * known.noise_n",
+           ("control/self_test/test_verdicts.py",)),
 )  # fmt: skip
