@@ -156,6 +156,13 @@ def test_words_that_a_refused_commit_has_taken_back_are_those_of_who_staged_them
     assert seen == [CommitAction.ROLLBACK, CommitAction.COMMIT]
 
 
+def test_a_set_allows_what_both_of_its_branches_reach_and_limits_that_leave_a_range():
+    untied = replace(CALIBRATION, falling_handles_n=(1.0, 30.0, 58.0))
+    assert untied.allowed_n == (1.0, 58.0)
+    with pytest.raises(ValueError, match="the highest must be above the lowest"):
+        replace(CALIBRATION, force_limits_n=(20.0, 20.0)).model()
+
+
 def test_a_set_without_slip_stops_is_whole_whoever_has_staged_some_before(bank, master, other):
     """Its words are those of the first stretch alone."""
     seen = []
