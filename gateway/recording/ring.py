@@ -100,7 +100,7 @@ class RingReader:
     def _places(self, first: int, end: int) -> list[tuple[int, int]]:
         """Return (place, bytes) of the rows first .. end - 1: one piece, or two around the seam."""
         size, seam = len(self.columns) * _ITEM, (end // self._capacity) * self._capacity
-        pieces = [(first, end)] if first >= seam or end == seam else [(first, seam), (seam, end)]
+        pieces = [(first, end)] if first >= seam else [(first, seam), (seam, end)]
         return [(_ROWS_AT + start % self._capacity * size, (stop - start) * size) for start, stop in pieces]
 
     def _open(self) -> bool:

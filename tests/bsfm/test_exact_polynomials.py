@@ -142,6 +142,17 @@ def test_branches_over_different_voltages_are_refused():
         Branches(polynomial((0.0, 1.0)), RationalBezier(0.0, 2.0, (0.0, 1.0), (1.0, 1.0)))
 
 
+def test_branches_are_tied_where_they_share_both_of_their_ends():
+    rising = polynomial((0.0, 1.0, 3.0))
+    tied = [Branches(rising, polynomial((low, 2.0, high))).tied for low, high in ((0.0, 3.0), (0.0, 3.5), (0.5, 3.0))]
+    assert tied == [True, False, False]
+
+
+def test_a_range_that_no_double_holds_is_refused():
+    with pytest.raises(ValueError, match="x0 < x1, both finite"):
+        RationalBezier(-1.5e308, 1.5e308, (0.0, 1.0), (1.0, 1.0))
+
+
 def test_curves_are_compared_hashed_copied_and_pickled_by_their_numbers():
     curve = RationalBezier(0.0, 8.0, (0.0, 18.0, 36.0), (1.0, 2.0, 3.0))
     for twin in (pickle.loads(pickle.dumps(curve)), copy.deepcopy(curve)):

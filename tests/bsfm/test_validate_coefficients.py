@@ -177,10 +177,11 @@ def test_the_floor_of_the_slope_is_per_volt_whatever_the_range(slope_n_per_v: fl
     assert line.minimum_slope() == pytest.approx(slope_n_per_v)
 
 
-def test_two_branches_are_over_the_same_voltages_or_none() -> None:
+@pytest.mark.parametrize(("low_v", "high_v"), [(0.0, 5.0), (0.5, 6.0)])
+def test_two_branches_are_over_the_same_voltages_or_none(low_v: float, high_v: float) -> None:
     falling = RationalBezier(0.0, 6.0, (0.0, 20.0), (1.0, 1.0))
     with pytest.raises(ValueError, match="same voltages"):
-        Branches(RationalBezier(0.0, 5.0, (0.0, 20.0), (1.0, 1.0)), falling)
+        Branches(RationalBezier(low_v, high_v, (0.0, 20.0), (1.0, 1.0)), falling)
 
 
 def test_what_overflows_is_infinite_on_its_own_side() -> None:

@@ -1,5 +1,7 @@
 """Numbers with an exponent, with a comma, as a program prints them, and in hexadecimal: what is one, and what is none."""
 
+from math import isnan
+
 import pytest
 
 from gateway.devices import cell_device, cell_host
@@ -15,6 +17,18 @@ from tests.dialogues.cells.test_overload_dialogue import cell
 def test_an_exponent_is_read_however_long_and_a_mantissa_has_one_digit(sent: str) -> None:
     decoded = compile_template("{x:+.4E}").decode(sent.encode())
     assert decoded == (None if sent.startswith("50") else {"x": 5.0})
+
+
+def test_a_number_that_rounds_to_nothing_has_no_minus_and_a_sign_alone_is_a_display_that_shows_nothing() -> None:
+    for template, sent in (
+        ("{x:.2f}", b"0.00"),
+        ("{x:+07.2f}", b"+000.00"),
+        ("{x:.1E}", b"0.0E+00"),
+        ("{x:g}", b"0.0"),
+    ):
+        assert compile_template(template).encode({"x": -0.0 if "E" in template else -1e-5}) == sent
+    blank = compile_template("{x:+07.2f}").decode(b"-      ", "x")
+    assert blank and isnan(float(blank["x"]))
 
 
 def test_a_number_that_no_double_holds_is_none() -> None:

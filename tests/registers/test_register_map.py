@@ -268,7 +268,7 @@ def test_every_fault_is_told_at_once_with_its_place():
     document = small() | {"version": 0}
     document["blocks"]["only"]["registers"][0]["access"] = "W"
     document["blocks"]["only"]["registers"][1]["text"] = 3
-    document["blocks"]["twin"] = {"first": 5, "last": 20, "repeats": {"onyl": 5}}
+    document["blocks"]["twin"] = {"first": 9, "last": 20, "repeats": {"onyl": 9}}
     document["blocks"]["third"] = {"first": 30, "last": 31, "registers": {}, "txet": ""}
     with pytest.raises(MapError) as caught:
         read_map(document)
@@ -281,7 +281,7 @@ def test_every_fault_is_told_at_once_with_its_place():
         (("blocks", "twin", "repeats", "onyl"), False),
         (("version",), False),
     ]
-    assert "twin: starts at 5 inside block only, which ends at 9" in str(caught.value)
+    assert "twin: starts at 9 inside block only, which ends at 9" in str(caught.value)
 
 
 def test_a_document_that_is_no_map_is_told_so():

@@ -128,6 +128,10 @@ def test_a_calibration_taken_into_use_amid_a_recording_decides_from_there(own: R
     assert later_calibrations(recorded) == [CalibrationUsed(7, pytest.approx(1.81, abs=0.03))]
     begun_late = replace(recorded, columns=recorded.columns | {"time_s": time_s + 100.0})
     assert later_calibrations(begun_late) == [CalibrationUsed(7, pytest.approx(1.81, abs=0.03))], "since the first row"
+    numbers = recorded.columns["calibration"].copy()
+    numbers[5:8] = np.nan
+    with_gap = replace(recorded, columns=recorded.columns | {"calibration": numbers})
+    assert later_calibrations(with_gap) == later_calibrations(recorded), "what is not there is no other one"
     follows = replay_control(recorded, replace(own, later={7: later}))
     found = by_signal(compare_decisions(time_s, recorded.columns, follows))
     assert found["feedforward_v"].rms < 0.4

@@ -82,7 +82,7 @@ class SentBsfm(Bsfm):
 
     def settled_n(self, voltage_v: float, branch_share: float) -> float:
         """Return the force that comes to rest at a voltage that was sent, N."""
-        straight = Bsfm(self.branches, self.reversal, self.limits_n)
+        straight = Bsfm(self.branches, self.reversal)
         return straight.settled_n(self._straight_v(voltage_v), branch_share)
 
     @property

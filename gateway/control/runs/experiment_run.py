@@ -33,7 +33,6 @@ class ExperimentRun:
             check_stairs(top_v, model, limits.safe_voltage_v) if plan.check and top_v > limits.safe_voltage_v else ()
         )
         self._check = LadderRun(CalibrationPlan(), settings, model, stairs)
-        self._rest_v = limits.safe_voltage_v
         self._began_s: float | None = None
         self._elapsed_s = 0.0
 
@@ -81,6 +80,6 @@ class ExperimentRun:
         if self._began_s is None:
             self._began_s = now_s
         self._elapsed_s = now_s - self._began_s
-        volts = self._rest_v if self.is_done else self.schedule.voltage_v(self._elapsed_s)
+        volts = self.schedule.voltage_v(self._elapsed_s)
         progress = min(1.0, self._elapsed_s / self.schedule.duration_s)
         return RunStep(volts, CalibrationPhase.EXPERIMENT, progress, self.eta_s)

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate, pairwise
-from math import isfinite
 from typing import Final
 
 from gateway.bsfm import RISING, Bsfm, InverseStatus
@@ -60,7 +59,7 @@ class _Range:
 
     def check_level_v(self, volts: float, level_text: str) -> float:
         """Return a voltage of the plan; ValueError where it is outside the rig's range. level_text: how the plan names it."""
-        if not (isfinite(volts) and self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V):
+        if not self.low_v - _SLACK_V <= volts <= self.top_v + _SLACK_V:  # nor is nan
             low_n, high_n = (self.model.force_n(end_v, RISING) for end_v in (self.low_v, self.top_v))
             payload = f", of which the payload presses {self.given_n:.1f} N" if self.given_n > 0.0 else ""
             raise ValueError(

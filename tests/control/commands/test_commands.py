@@ -261,6 +261,8 @@ def test_a_number_that_is_none_is_named_and_the_next_command_is_whole_again():
     tracker.take(0.2, Command(number=2, force_setpoint_n=6.0))
     assert not tracker.not_finite
     assert tracker.demand == demand_of(Command(number=2, force_setpoint_n=6.0), settings())
+    tracker.take(0.3, Command(number=3, force_setpoint_n=6.0, payload_kg=nan))
+    assert tracker.not_finite.startswith("payload_kg")
 
 
 def test_turning_round_counts_the_weight_of_the_command_in_use_the_other_way_at_once():

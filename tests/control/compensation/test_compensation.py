@@ -1,6 +1,6 @@
 """What control takes back of known defects: each formula undoes what the defect does, and nothing known changes nothing."""
 
-from math import cos, nan, pi
+from math import cos, inf, isnan, nan, pi
 
 import pytest
 from hypothesis import given
@@ -95,6 +95,14 @@ def test_without_a_thermometer_a_warm_cell_is_taken_as_it_reads():
 def test_a_reading_beyond_the_bend_stays_large():
     """A curve that turns back must not hide an overload."""
     assert CellMap(quadratic_per_n=-0.01).force_n(90.0, nan, 0.0) > 60.0
+    assert CellMap(quadratic_per_n=0.01).force_n(-90.0, nan, 0.0) < -60.0
+    assert 20.0 < CellMap(span_per_k=-0.02).force_n(20.0, 80.0, 0.0) < 200.0, "nor does a heat that leaves no span"
+
+
+def test_a_reading_that_is_none_is_no_force():
+    bent = CellMap(quadratic_per_n=-0.01)
+    assert isnan(bent.force_n(nan, 20.0, 0.0))
+    assert (bent.force_n(inf, 20.0, 0.0), bent.force_n(-inf, 20.0, 0.0)) == (inf, -inf)
 
 
 @given(voltage_v=st.floats(0.0, 10.0), bow=st.floats(-0.12, 0.12), s=st.floats(-0.05, 0.05))

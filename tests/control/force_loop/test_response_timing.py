@@ -87,6 +87,13 @@ def test_a_second_lag_that_no_setting_can_brake_counts_as_dead_time(lags_ms, dea
     assert (timing.lags.lag_s, timing.lags.second_lag_s) == pytest.approx([ms * 1e-3 for ms in left_ms])
 
 
+def test_a_plant_that_rings_keeps_both_of_its_lags():
+    """They say where its pair of poles is, and not how long two lags are."""
+    rings = Response(dead_time_s=0.02, lag_s=0.1, second_lag_s=0.01, damping=0.5)
+    timing = timing_of(rings, settings()).timing
+    assert timing and (timing.dead_time_s, timing.lags.delay_s, timing.lags.damping) == (0.02, 0.11, 0.5)
+
+
 def test_without_a_response_or_by_the_rigs_word_nothing_changes():
     response, rig = Response(dead_time_s=0.1, lag_s=0.1), replace(settings(), response=ResponseSource.RIG)
     assert timing_of(None, settings()) == settings()

@@ -33,6 +33,13 @@ SHORT = plan(
 )
 
 
+def test_a_plan_that_stays_at_rest_has_no_stairs_to_check() -> None:
+    """Ten of them at the safe voltage would show nothing, and take their time."""
+    rests = ExperimentRun(plan(Move(do=MoveKind.DWELL, hold_s=1.0), check=True), settings(), bsfm(), 0.0)
+    moves = ExperimentRun(plan(Move(do=MoveKind.STEP, to_v=3.0, hold_s=1.0), check=True), settings(), bsfm(), 0.0)
+    assert rests.eta_s < 3.0 < moves.eta_s
+
+
 def test_moves_put_out_what_they_say() -> None:
     moved = Schedule(segments_of(SHORT, LIMITS, bsfm()), 0.0)
     volts = [moved.voltage_v(at_s) for at_s in (0.0, 0.49, 1.0, 1.6, 1.85, 2.45, 2.7, 2.85)]

@@ -44,6 +44,8 @@ BOUNDS = {
     "noise": (lambda x: judge_noise(x, RIG), 0.25, 0.5, "allowed 0.250 N, fails above 0.500 N (in_band_tolerance_n 1 N)"),
     "noise, calibrated": (lambda x: judge_noise(x, MEASURED), 0.1, 0.2,
                           "allowed 0.100 N, fails above 0.200 N (0.050 N when it was calibrated)"),
+    "noise, calibrated as none": (lambda x: judge_noise(x, replace(RIG, noise_n=0.001)), 1.0 / 20.0, 1.0 / 6.0,
+                                  "allowed 0.050 N, fails above 0.167 N (0.001 N when it was calibrated)"),
     "resolution": (lambda x: judge_resolution(x, 200, RIG), 0.2, 0.5, "allowed 0.200 N, fails above 0.500 N"),
     "response": (lambda x: judge_response(x, RIG), 0.29, 0.53,
                  "allowed 290 ms, fails above 530 ms (120 ms supervision.response_lag_s)"),
@@ -201,6 +203,21 @@ def test_lost_answers_are_counted(counts: WireCounts | None, verdict: object, wo
 
 def test_counts_are_taken_from_each_other() -> None:
     assert WireCounts(10, 8, 3).since(WireCounts(4, 5, 1)) == WireCounts(6, 3, 2)
+
+
+def test_counts_that_the_rig_file_allows_do_not_fail_in_a_narrow_band() -> None:
+    supervision = replace(RIG.settings.supervision, sample_quantum_n=0.5)
+    coarse = replace(RIG, settings=replace(RIG.settings, supervision=supervision))
+    assert judge_resolution(0.9, 200, coarse).verdict is PASSED
+    assert judge_resolution(1.1, 200, coarse).verdict is FAILED
+
+
+def test_what_an_item_has_failed_by_is_not_overwritten_by_the_fault_that_followed() -> None:
+    found = {Item.SCALE: Finding(Item.SCALE, FAILED, "its own words")}
+    report = report_of(1, found, RunEnding(FaultCode.OVER_FORCE, is_done=False, wants_force=True))
+    assert next(one for one in report.findings if one.item is Item.SCALE).text == "its own words"
+    stopped = report_of(1, {}, RunEnding(FaultCode.OVER_FORCE, is_done=False, wants_force=True))
+    assert next(one for one in stopped.findings if one.item is Item.SCALE).verdict is FAILED
 
 
 def test_bounds_that_follow_the_band_grow_with_it() -> None:

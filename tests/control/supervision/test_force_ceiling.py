@@ -38,6 +38,20 @@ def test_behind_a_way_down_a_stair_is_judged_by_those_of_its_own_way_up() -> Non
     assert ceiling.is_beyond(5.0, 0.0)
 
 
+def test_a_partial_reversal_is_no_top_of_the_ladder() -> None:
+    """Friction may have kept more there, and stairs that this rig may take were left out."""
+    ceiling = ceiling_at(bsfm().force_n(3.0, 1.0), 0.0)
+    for volts, direction, force_n in (
+        (5.0, 1, bsfm().force_n(5.0, 1.0)),
+        (3.0, -1, 20.0),
+        (5.0, 1, 49.0),
+        (3.0, -1, 20.0),
+    ):
+        phase = CalibrationPhase.MINOR_LOOPS if force_n in (20.0, 49.0) else CalibrationPhase.LADDER
+        ceiling.observe_row(LadderRow(PlannedStair(volts, direction, 0, phase), force_n, 1.0, True))
+    assert not ceiling.is_beyond(5.5, 0.0)
+
+
 @pytest.mark.parametrize(("weight_n", "is_reached"), [(0.0, False), (20.0, True)])
 def test_the_force_of_now_is_judged_with_it_too(weight_n: float, is_reached: bool) -> None:
     assert ceiling_at(35.0, weight_n).is_reached(0.0) is is_reached

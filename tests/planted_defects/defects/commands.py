@@ -165,4 +165,6 @@ DEFECTS = (
     Defect("the heartbeat of a frame that was refused renews the lease", "control/command_edges.py",
            "        if command.has_waited or command.repeats:", "        if command.has_waited:",
            ("control/commands/test_command_edges.py",)),
+    Defect("a payload that is no number is read over behind a good one", "control/demand.py",
+           "        and one.payload_kg == other.payload_kg\n", "", ("control/commands/test_commands.py",)),
 )  # fmt: skip

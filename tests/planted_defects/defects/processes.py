@@ -123,4 +123,8 @@ DEFECTS = (
            "    signal.SIGTSTP,\n", "", ("service/supervisor/test_event_wait.py",)),
     Defect("a run of whose end nobody knows has ended well", "service/clean_shutdown_marker.py",
            "            was_unclean = True\n", "            was_unclean = False\n", ("service/test_starting.py",)),
+    Defect("a simulated rig that dies on the way down is not looked after", "service/supervisor/other_children.py",
+           "        return [one for one in self._all if one is self._rig] if self.is_stopping else self._all",
+           "        return [] if self.is_stopping else self._all",
+           ("service/supervisor/test_guardian_ends.py",)),
 )  # fmt: skip

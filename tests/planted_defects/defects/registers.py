@@ -182,4 +182,13 @@ DEFECTS = (
     Defect("the next process does not know of a heartbeat that was refused once", "registers/writes/admission.py",
            "        if refused.reason is RefusalReason.HEARTBEAT_STALE and HEARTBEAT in self._offsets(write):\n",
            "        if False:\n", ("service/running_rig/masters/drawn/test_drawn_programs.py",)),
+    Defect("a request that writes and may not read is no refused write", "registers/bank.py",
+           "raise self._note_refused_write(no_such_address(", "raise self._note_refusal(no_such_address(",
+           ("registers/bank/test_reading.py",)),
+    Defect("a read-only word of the command is written with its neighbours", "registers/bank.py",
+           "0 < count <= self._image.writable[address]", "0 < count <= self._room[address]",
+           ("registers/bank/test_blocks_of_own_maps.py",)),
+    Defect("slip stops that another has staged keep out a set that has none", "registers/upload/staging_block.py",
+           "        end = BLOCK_BYTES // 2 if has_tail else TAIL_FROM", "        end = BLOCK_BYTES // 2",
+           ("registers/bank/test_staging.py",)),
 )  # fmt: skip

@@ -185,4 +185,8 @@ DEFECTS = (
     Defect("what was only counted is told at the end alone", "audit/rig_audit.py",
            "        self._writes.flush()\n        self._log.flush()", "        self._log.flush()",
            ("audit/test_rig_audit.py",)),
+    Defect("a calibration allows what its rising branch alone reaches", "bsfm/model.py",
+           "        return max(rising[0], falling[0]), min(rising[-1], falling[-1])\n\n    def model",
+           "        return rising[0], rising[-1]\n\n    def model",
+           ("registers/bank/test_staging.py",)),
 )  # fmt: skip

@@ -58,3 +58,15 @@ def test_a_number_of_an_upload_is_no_other_than_the_gateway_takes_it_for(
     own = load_register_map(tmp_path / "own.yaml")
     with pytest.raises(ValueError, match=f"{told}.*, an upload has (float32|uint32), high word first"):
         RegisterBank(own, BankRules(rig_name="own", force_max_n=60.0), now=lambda: 0.0)
+
+
+def test_a_word_of_the_command_that_a_map_has_read_only_is_written_by_nobody(tmp_path: Path) -> None:
+    ramp = "name: force_ramp, address: 2, type: int16, scale: 0.1, unit: N/s, access: RW"
+    assert SHIPPED.count(ramp) == 1
+    (tmp_path / "own.yaml").write_text(SHIPPED.replace(ramp, ramp.replace("RW", "R")))
+    own = load_register_map(tmp_path / "own.yaml")
+    bank = RegisterBank(own, BankRules(rig_name="own", force_max_n=60.0), now=lambda: 0.0)
+    bank.write_registers(0, bytes((0, 1, 4, 176)), PEER)
+    with pytest.raises(Refusal, match="force_ramp"):
+        bank.write_registers(1, bytes((4, 176, 0, 100)), PEER)
+    assert bank.command.force_ramp_n_per_s == 0.0

@@ -56,6 +56,16 @@ def test_a_range_that_no_block_holds_is_02_with_a_reason(bank, address, count, s
     assert told == [caught.value.sentence] * 2
 
 
+def test_a_request_that_writes_and_may_not_read_is_a_write_that_is_refused(bank, master):
+    """Of an FC23 nothing is written then: its owner is told so when its heartbeat is missed, and the audit notes it."""
+    noted = []
+    bank.on_refused_write = lambda refusal, peer: noted.append((refusal.sentence, peer))
+    master.write(0, 1, 1200)
+    with pytest.raises(Refusal) as caught:
+        bank.check_registers_readable(999, 1, master.peer)
+    assert noted == [(caught.value.sentence, master.peer)] and bank.owner_refused == caught.value.sentence
+
+
 def test_a_refused_read_is_readable_in_the_registers(bank, master):
     with pytest.raises(ModbusError):
         bank.read_registers(40001, 1)

@@ -12,7 +12,7 @@ from gateway.bsfm.model import Calibration
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Role
 from gateway.registers import Refusal, RegisterBank
-from gateway.registers.upload.coefficients import SET_BYTES, CoefficientSet
+from gateway.registers.upload.coefficients import HEAD_WORDS, SET_BYTES, CoefficientSet
 from gateway.registers.words import CommitAction, CommitNotice, CommitStatus, UploadReason
 
 CALIBRATION = Calibration(
@@ -154,6 +154,25 @@ def test_words_that_a_refused_commit_has_taken_back_are_those_of_who_staged_them
     bank.staging.on_commit = lambda action, words, peer: seen.append(action)
     master.write(1145, CommitAction.COMMIT)
     assert seen == [CommitAction.ROLLBACK, CommitAction.COMMIT]
+
+
+def test_a_set_allows_what_both_of_its_branches_reach_and_limits_that_leave_a_range():
+    untied = replace(CALIBRATION, falling_handles_n=(1.0, 30.0, 58.0))
+    assert untied.allowed_n == (1.0, 58.0)
+    with pytest.raises(ValueError, match="the highest must be above the lowest"):
+        replace(CALIBRATION, force_limits_n=(20.0, 20.0)).model()
+
+
+def test_a_set_without_slip_stops_is_whole_whoever_has_staged_some_before(bank, master, other):
+    """Its words are those of the first stretch alone."""
+    seen = []
+    bank.staging.on_commit = lambda action, words, peer: seen.append(action)
+    other.write(1150, 3)
+    master.write(1140, HEAD_WORDS)
+    master.write(1145, CommitAction.COMMIT)
+    master.write(1140, HEAD_WORDS + 50)
+    assert master.refusal(master.write, 1145, CommitAction.COMMIT).reason is RefusalReason.BUSY
+    assert seen == [CommitAction.COMMIT]
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,24 @@ def test_a_loop_that_came_late_says_how_late_and_how_much_it_waited(kernel: Kern
     assert kernel.held(0.5).loop_late_s == 0.0, "what was before the silence explains nothing"
 
 
+def test_a_loop_has_waited_for_no_longer_than_it_is_late(kernel: Kernel) -> None:
+    """It waited in its own period, too."""
+    kernel.stall(0.25, waited_s=0.25)
+    held = kernel.held(0.25)
+    assert held.loop_waited_s == held.loop_late_s == pytest.approx(0.24)
+
+
+def test_a_rig_that_takes_the_place_of_a_stopped_one_was_not_stopped(kernel: Kernel, tmp_path: Path) -> None:
+    for _ in range(10):
+        kernel.ticks(1, rig_runs=False)
+        kernel.write("T")
+        kernel.lateness.tick(kernel.now_s, kernel.waited_s)
+    assert kernel.held(0.1).rig_stopped_s > 0.0
+    kernel.lateness.follow_rig(SchedulerCounters(PID, tmp_path))
+    kernel.ticks(2)
+    assert kernel.held(0.1).rig_stopped_s == 0.0
+
+
 def test_what_was_withheld_counts_where_the_loop_came_late(kernel: Kernel) -> None:
     kernel.withheld = 0.1, "the host"
     assert kernel.held(0.3) == Held(loop_waited_s=0.0), "in time all the same"

@@ -12,6 +12,7 @@ from gateway.control.inputs import Output
 from gateway.devices import ValveHost
 from gateway.devices.messages import ForceSample, RepeatedSample
 from gateway.profiles import load_device
+from gateway.registers.command import Status
 from gateway.registers.words import LimitedBy, State, StatusBit
 from gateway.service.running_rig.lines.valve_line import ValveExchange
 from gateway.service.running_rig.published_status import BackgroundStatus, LoopHealth, status_of
@@ -26,6 +27,8 @@ def test_another_cell_behind_the_port_stops_a_force_and_is_asked_again_by_a_rese
     wired = Wired().pressing(12.0)
     identity = wired.loop._cell.identity
     identity.fault, identity.said = FaultCode.WRONG_DEVICE, "KERN 1.2"
+    wired.loop.output._unread = "the output's last answer could not be read"
+    assert wired.loop._line(wired.now_s).said == "KERN 1.2", "whose fault it is"
     assert wired.voltage_reaches_safe(0.1) <= 0.1
     assert wired.fault_code is FaultCode.WRONG_DEVICE
     assert any("KERN 1.2" in sentence for sentence in wired.said("A"))
@@ -198,3 +201,12 @@ def test_the_registers_show_each_part_of_a_decision_as_what_it_is() -> None:
     status = status_of(decision, health, 1e5, BackgroundStatus(3))
     assert (status.limited_by, status.warning_word) == (LimitedBy.VOLTAGE_SLEW, WarningBit.SLOW_LOOP)
     assert (status.sequence_echo, status.missed_ticks, status.calibration_id) == (7, 3, 3)
+
+
+def test_each_number_of_a_decision_stands_under_its_own_name() -> None:
+    shown = set(Output._fields) & set(Status._fields) - {"state", "limited_by", "calibration_phase"}
+    decision = Output(1.0)._replace(**{name: 2.0 + k for k, name in enumerate(sorted(shown))})
+    status = status_of(decision, LoopHealth(), 1e5, BackgroundStatus(3))
+    assert {name: getattr(status, name) for name in shown} == {name: getattr(decision, name) for name in shown}
+    assert {"feedforward_v", "trim_v", "force_requested_n", "force_accepted_n", "force_applied_n"} < shown
+    assert status.output_voltage_v == decision.voltage_v == 1.0

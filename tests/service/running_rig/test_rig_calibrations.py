@@ -28,7 +28,9 @@ def test_of_the_rigs_own_calibration_a_start_says_nothing_more(tmp_path: Path) -
 def test_of_one_that_was_chosen_it_says_which_and_what_is_doubtful(tmp_path: Path) -> None:
     store = CalibrationStore(tmp_path, real().calibration)
     store.use(store.add(calibration(8, rig="right-cell")), None)
-    chosen, doubts = RigCalibrations(real(), tmp_path).notes
+    calibrations = RigCalibrations(real(), tmp_path)
+    assert calibrations.rig.calibration.number == 2, "and presses by it"
+    chosen, doubts = calibrations.notes
     assert chosen.startswith("calibration 2 of ")
     assert "right-cell" in doubts
 

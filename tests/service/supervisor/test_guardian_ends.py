@@ -93,6 +93,16 @@ def test_a_rig_that_dies_is_started_again_and_control_learns_where_it_is_now(sce
     assert len(one.starter.started) == 1, "control was left alone"
 
 
+def test_a_rig_that_dies_on_the_way_down_is_started_again_for_the_rest_of_it(scene, port):
+    one = scene(lives(port), rigs=(rig_lives, rig_lives))
+    assert_comes_up(one)
+    beats_until_told(one)
+    one.signals.send()
+    assert [message.tag for message in beats_until_told(one)] == [message_link.STOP]
+    one.starter.rigs_started[0].dies(-9)
+    assert [message.tag for message in beats_until_told(one)] == [message_link.RIG]
+
+
 def test_a_rig_that_never_starts_is_told_to_control_in_the_end(scene, port):
     def dies(child: FakeChild) -> None:
         child.say(message_link.BORN, {"pid": 3})

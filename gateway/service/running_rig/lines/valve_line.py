@@ -71,7 +71,7 @@ class ValveExchange:
     def tick(self, now_s: float) -> None:
         """Give up waiting for an overdue answer and ask again; unanswered_since_s keeps the age of the silence."""
         if now_s - self._sent_s > self._reply_timeout_s:
-            self._sent_s, self._next_s = inf, now_s
+            self._sent_s = inf  # the next one is due: this one was
         self._send_next(now_s)
 
     @property

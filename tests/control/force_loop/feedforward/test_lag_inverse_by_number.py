@@ -1,12 +1,15 @@
 """The inverse of the lags by its formulas: what its pulses, its horizon and its linear law are, whatever plant follows."""
 
+from dataclasses import replace
 from math import exp, nan
 
 import pytest
 
+from gateway.bsfm import Branches, Bsfm, LinearBlend, RationalBezier
+from gateway.bsfm.drive_map import DriveMap
 from gateway.bsfm.response.second_order import SecondOrder
 from gateway.control import Limits
-from gateway.control.force_loop.lag_inverse import LagInverse, _move, _pulses, _sort_lags
+from gateway.control.force_loop.lag_inverse import LagInverse, LinearizedLagInverse, _move, _pulses, _sort_lags
 from gateway.control.limits import TICK_S
 
 LIMITS = Limits(force_max_n=50.0, over_force_n=60.0, voltage_max_v=8.5)
@@ -88,6 +91,34 @@ def test_a_held_voltage_is_followed_as_lags_follow_it_in_one_step_or_many() -> N
     assert slow.second_v == pytest.approx(4.0 * (1.0 - (0.15 * exp(-0.1 / 0.15) - 0.05 * exp(-0.1 / 0.05)) / 0.1))
 
 
+def test_a_model_that_moves_past_the_voltage_goes_on_moving() -> None:
+    inverse = LagInverse(SLOW, LIMITS)
+    inverse.first_v, inverse.second_v = 5.0, 4.0
+    inverse.advance(4.0, 0.01)
+    assert 4.0 < inverse.second_v < inverse.first_v < 5.0
+
+
+def test_where_the_command_map_bends_all_is_reckoned_in_linearized_volts() -> None:
+    rising = RationalBezier(0.0, 8.0, (1.0, 12.0, 46.0), (1.0, 1.0, 1.0))
+    falling = RationalBezier(0.0, 8.0, (1.0, 16.0, 50.0), (1.0, 1.0, 1.0))
+    bent = Bsfm(Branches(rising, falling), LinearBlend(6.0))
+    limits, linear = replace(LIMITS, voltage_min_v=0.5, safe_voltage_v=1.0), DriveMap(bent).linear_v
+    ends = {name: linear(getattr(limits, name)) for name in ("voltage_min_v", "voltage_max_v", "safe_voltage_v")}
+    inverse, straight = LinearizedLagInverse(SLOW, limits, bent), LagInverse(SLOW, replace(limits, **ends))
+    assert inverse.first_v == pytest.approx(1.0)
+    for held_v, wanted_v in ((6.0, 3.0), (0.5, 2.0), (4.0, 0.7), (1.0, 8.0), (2.0, 9.5)):
+        inverse.advance(held_v, 0.05)
+        straight.advance(linear(held_v), 0.05)
+        assert linear(inverse.second_v) == pytest.approx(straight.second_v)
+        for standing_v in (0.5, 3.0, 6.0):
+            asked_v = straight.compensated_v(linear(wanted_v), linear(standing_v))
+            assert linear(inverse.compensated_v(wanted_v, standing_v)) == pytest.approx(asked_v)
+    inverse.go_on_from(1.4, 5.1)
+    straight.first_v, straight.second_v = linear(1.4), linear(5.1)
+    asked_v = straight.compensated_v(linear(3.9), linear(2.7))  # what stands bounds this push
+    assert linear(inverse.compensated_v(3.9, 2.7)) == pytest.approx(asked_v)
+
+
 def test_one_lag_is_at_the_wish_a_horizon_later() -> None:
     inverse = LagInverse(ONE, LIMITS)
     inverse.first_v = inverse.second_v = 3.0
@@ -119,6 +150,9 @@ def test_what_is_asked_for_stays_within_the_range_and_what_an_output_cannot_reso
     inverse.first_v = inverse.second_v = 4.0
     assert inverse.compensated_v(4.00001, 4.0) == 4.00001
     assert 0.0 <= inverse.compensated_v(0.5, 4.0) < 0.5
+    raised = LagInverse(lags, replace(LIMITS, voltage_min_v=1.0))
+    raised.first_v = raised.second_v = 4.0
+    assert raised.compensated_v(0.5, 4.0) == 0.5, "a wish below the range passes"
 
 
 @pytest.mark.parametrize(

@@ -34,6 +34,17 @@ def test_behind_a_small_movement_an_error_is_one_that_stays():
     assert abs(watched(0.8, 0.0, 12.0, 0.05).transient_n) > 0.2, "behind a large one nobody knows yet"
 
 
+def test_what_is_left_of_a_movement_makes_it_no_smaller():
+    """It is noted again and again, while it arrives."""
+    whole, noted = TransientEstimate(), TransientEstimate()
+    for one, pushes_n in ((whole, (12.0,)), (noted, (-12.0, 6.0, 0.5))):
+        one.lag_s = LAG_S
+        for push_n in pushes_n:
+            one.push(push_n)
+        one.observe(0.8, 0.02, SAMPLE_S)
+    assert noted.transient_n == whole.transient_n > 0.2
+
+
 def test_what_was_left_of_a_movement_is_over_a_few_lags_later():
     assert abs(watched(0.5, 0.5, 12.0, 8.0 * LAG_S, 0.1).transient_n) < 0.01
 

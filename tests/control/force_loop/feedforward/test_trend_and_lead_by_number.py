@@ -111,6 +111,23 @@ def test_a_lead_without_lags_passes_every_wish_and_one_with_them_pushes_within_t
     assert (one.compensated_v(1.0), one.compensated_v(7.0005)) == (0.0, 7.0005)
 
 
+def test_a_lead_begins_at_the_safe_voltage_and_pushes_no_lower_than_the_range() -> None:
+    limits = Limits(force_max_n=50.0, over_force_n=60.0, voltage_min_v=1.0, voltage_max_v=8.5, safe_voltage_v=1.5)
+    lead = LeadCompensator(LeadSettings(lag_s=0.1, second_lag_s=0.05), limits)
+    assert lead.compensated_v(1.5) == 1.5
+    lead.advance(8.0, 1.0)
+    assert lead.compensated_v(1.2) == 1.0
+    assert lead.compensated_v(0.5) == 0.5, "a wish outside the range passes"
+
+
+def test_nearly_equal_lags_follow_a_voltage_as_equal_ones_do() -> None:
+    """The general form divides by their difference."""
+    for second_s in (0.1, 0.1 * (1.0 - 1e-15), 0.1 * (1.0 - 1e-12), 0.1 * (1.0 - 1e-8)):
+        lead = LeadCompensator(LeadSettings(lag_s=0.1, second_lag_s=second_s), LIMITS)
+        lead.advance(4.0, 0.1)
+        assert lead.second_v == pytest.approx(4.0 * (1.0 - 2.0 * exp(-1.0)), rel=1e-6), second_s
+
+
 def test_a_delay_gives_what_was_so_long_ago() -> None:
     delay = TransportDelay(0.25)
     delay.restart(5.0)

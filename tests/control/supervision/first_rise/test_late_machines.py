@@ -49,9 +49,10 @@ def test_a_cell_of_a_late_machine_that_freezes_is_found_in_the_next_step(delay_s
     assert found_s < 1.0 + 2.0 * (delay_s + lag_s)
 
 
-def watched(volts: Iterable[float], lag_s: float) -> list[str]:
+def watched(volts: Iterable[float], lag_s: float, *, lacks_air: bool = False) -> list[str]:
     """What the check says of a cell that repeats 12 N in contact, while these voltages stand for a sample each."""
     check, response = StuckSensorCheck(settings().supervision), ExpectedForce(bsfm(), lag_s, 0.0, stands_v=2.0)
+    response.note_around(0.0, lacks_air=lacks_air)
     reading, words = Reading(12.0, 12.0, 0.0, 0.01, True, True, True, False, 12.0), []
     for voltage_v in volts:
         response.advance(voltage_v, 0.01)
@@ -69,3 +70,7 @@ def test_a_cell_has_the_time_of_its_machine_to_move_and_never_less_than_0_3_s(la
 
 def test_a_push_that_is_over_before_the_machine_answers_need_not_move_it() -> None:
     assert not any(watched([2.0] * 150 + [6.0] * 3 + [2.0] * 150, 0.5))
+
+
+def test_without_air_a_cell_may_repeat_itself_however_high_the_voltage_is() -> None:
+    assert not any(watched([2.0] * 150 + [6.0] * 150, 0.02, lacks_air=True))

@@ -164,3 +164,12 @@ def test_two_neighbouring_counts_and_a_force_that_falls_once_are_no_defect(
         for force_n in said_n:
             check.passes_over(force_n, force_n)
     assert check.two_values == ""
+
+
+def test_two_values_of_before_are_none_of_now() -> None:
+    check = LeapCheck(0.1)
+    for force_n in (0.0, 20.0) * 4:
+        check.passes_over(force_n, force_n)
+    assert check.two_values
+    check.forget()
+    assert check.two_values == "" and not check.passes_over(20.0, 20.0)

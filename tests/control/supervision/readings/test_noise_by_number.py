@@ -1,10 +1,12 @@
 """How large a noise is by windows of samples, and how seldom it repeats itself, against numbers worked out by hand."""
 
 from math import cos, erf, exp, inf, log, nan, pi, sqrt, tau
+from random import Random
 from types import SimpleNamespace
 
 import pytest
 
+from gateway.control.supervision import repeated_readings
 from gateway.control.supervision.noise_spread import (
     WINDOW,
     Pool,
@@ -202,3 +204,28 @@ def test_only_a_pool_that_is_clearly_quieter_takes_the_place_of_what_is_known(
     readings._known = known = Spread(1.0, 0.02, 400.0, 400.0)
     readings._pool = SimpleNamespace(windows=windows, spread=now)  # type: ignore[assignment]
     assert readings._quieter_now() is (now if is_taken else known)
+
+
+def test_a_cell_that_lives_again_is_learned_from_again_and_not_what_it_has_repeated() -> None:
+    readings = RepeatedReadings()
+    for value_n in (*(float(k % 2) for k in range(20)), *[1.0] * 30):
+        readings.observe(value_n, 0.01, under_force=True)
+    readings.forget_run()
+    readings.observe(0.0, 0.01, under_force=True)
+    assert readings.longest == 1
+    for value_n in (*[0.0] * 6, 1.0):
+        readings.observe(value_n, 0.01, under_force=True)
+    assert readings.longest == 7
+
+
+def test_however_long_a_spindle_shakes_the_cell_its_quiet_at_rest_is_remembered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With one memory for both the spindle's stop was a dead cell."""
+    monkeypatch.setattr(repeated_readings, "POOLS", 2)
+    monkeypatch.setattr(repeated_readings, "POOL_WINDOWS", 4)
+    readings, rng = RepeatedReadings(), Random(5)
+    for spread, under_force in ((1.0, False), (5.0, True)):
+        for _ in range(800):
+            readings.observe(float(round(rng.gauss(0.0, spread))), 0.01, under_force)
+    assert 0.5 < readings.counts < 1.5

@@ -124,6 +124,7 @@ def test_one_that_goes_on_for_days_goes_on_in_another_file(recordings: Recording
         for later_s in (0.0, 0.01):
             recordings.flush(1.0 + 1.01 * day * LONGEST_S + later_s)
     assert recordings.status()["recording"].endswith("0004.fgr")
+    assert recordings.status()["began_in"].endswith("0001.fgr"), "whoever follows it knows it by that"
     assert {label_of(entry.header).name for entry in list_recordings(tmp_path)} == {"for ever"}
     assert len([line for line in recordings._log if "as long as one may be" in line]) == 3
     recordings.stop()

@@ -71,6 +71,17 @@ def test_one_that_ends_by_its_time_before_it_has_a_file_is_told_so(
     assert [line for line in log if "ends after 5 s, 0 rows" in line and "None" not in line]
 
 
+def test_one_that_was_stopped_before_its_file_was_made_does_not_begin_in_the_next_process(
+    recordings: Recordings, disk: HangingDisk
+) -> None:
+    wanted: list[object] = []
+    recordings.on_wanted = wanted.append
+    recordings.start()
+    recordings.stop()
+    disk.let_go()
+    assert wanted == [None]
+
+
 def test_an_empty_recording_that_the_disk_has_ended_leaves_its_number_used(tmp_path: Path, log: Log) -> None:
     """The one before it was deleted without a mark, for it was not the highest."""
     recordings = Recordings(tmp_path / "recordings", demo(), log, AtOnce())  # type: ignore[arg-type]

@@ -1,8 +1,11 @@
 """A machine that was suspended: its monotonic clock stood still, so that all that waited meanwhile seemed to come in time."""
 
+from math import inf
+
 import pytest
 
 from gateway.codes.faults import FaultCode
+from gateway.defaults import STALL_S
 from gateway.registers.refusal import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.last_tick import LastTick
@@ -66,6 +69,17 @@ def test_a_machine_that_woke_long_ago_presses_as_ever() -> None:
         wired.suspended_s = HOUR_S - 1e-6 * (k % 3)  # two clocks are never read at one moment
         wired.run(0.005)
     assert wired.state is State.HOLDING
+
+
+def test_a_loop_is_awake_since_its_last_standstill_and_knows_that_later_too() -> None:
+    """What a master has kept since before it has not been seen for so long."""
+    last = LastTick(lambda: 0.0)
+    for now_s in (1.0, 1.01, 1.01 + 2.0 * STALL_S):
+        assert last.awake_since_s(now_s) == (now_s if now_s > 1.01 else -inf)
+        last.note(now_s, None)
+    for later_s in (0.01, 0.02):
+        assert last.awake_since_s(now_s + later_s) == now_s
+        last.note(now_s + later_s, None)
 
 
 def test_what_passes_between_the_reading_of_two_clocks_is_no_suspension() -> None:
