@@ -16,6 +16,7 @@ from gateway.control.settings import ResponseSource, SafeDirection
 from gateway.plants.store import NumberedPlant, PlantStore, Provenance
 from gateway.profiles import Rig, load_device, load_plant, load_rig
 from gateway.profiles.kinds.plant_writer import with_origins
+from gateway.profiles.recordings_section import Retention
 from gateway.profiles.rigs.assembly import check_report
 from gateway.profiles.rigs.compensated_effects import compensation_of, in_simulation, without_compensable
 from gateway.profiles.rigs.faces import RtuFace
@@ -78,6 +79,8 @@ OWN_BOUNDS: tuple[dict[str, Any], ...] = (
     {"connections": 9, "per_address": 1},
 )
 """Of the network: an idle connection is closed soon, or whoever asks more waits, or there are places for the masters only."""
+ROOMS = None, 60_000
+"""Bytes of all recordings; a second of one takes ten thousand."""
 BUS_TOO_SHARE = 0.2
 """Of rigs that have something else of their own."""
 BOW = 0.005
@@ -192,11 +195,12 @@ def _draw_own(seed: int) -> Random | None:
 
 
 def _with_own(rig: Rig, kind: str, chance: Random) -> Rig:
-    """In these, there may be two serial faces, and other bounds of the network; and a lease of another length."""
+    """In these, there may be two serial faces, other bounds of the network, little room for recordings; and a lease of another
+    length."""
     buses = ("bus", "second bus") if kind == "buses" else ("bus",) if chance.random() < BUS_TOO_SHARE else ()
     network = replace(rig.network, **chance.choice(OWN_BOUNDS))
     faces = tuple(RtuFace(type="rtu", port=bus) for bus in buses)
-    return replace(rig, network=network, fieldbus=faces)
+    return replace(rig, network=network, fieldbus=faces, retention=Retention(bytes=chance.choice(ROOMS)))
 
 
 def _with_effects(rig: Rig, chance: Random) -> Rig:
