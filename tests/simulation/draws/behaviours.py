@@ -129,7 +129,7 @@ def draw_frames(seed: int) -> Iterator[Event]:
 
 
 def draw_paths(seed: int) -> Iterator[Event]:
-    """A master writes a path of forces, stops at once now and then, and goes on."""
+    """A master writes a path of forces, stops at once, and goes on with another one now and then."""
     chance = Random(f"path {seed}")
     if chance.random() > PATH_SHARE:
         return
@@ -141,8 +141,7 @@ def draw_paths(seed: int) -> Iterator[Event]:
         numbers = (mean_n, share * min(mean_n, 55.0 - mean_n), chance.choice((0.4, 1.0, 4.0, 12.0)))
         yield Event(round(at_s, 4), whom, "follow", tuple(round(number, 2) for number in numbers))
         at_s += chance.uniform(0.5, 3.0)
-        if chance.random() < 0.5:
-            yield Event(round(at_s, 4), whom, "hold", (round(chance.uniform(*FORCE_N), 2),))
+        yield Event(round(at_s, 4), whom, "hold", (round(chance.uniform(*FORCE_N), 2),))
 
 
 def _stop(chance: Random, at_s: float) -> Iterator[Event]:
