@@ -49,7 +49,7 @@ def no_state_directory(directory: Path) -> CliError:
 
 def no_such_recording(path: Path) -> CliError:
     """Return E403: neither a file nor a number of this state directory."""
-    return CliError(f"E403 {path}: no such recording; force-gateway recordings list shows the numbers", exit_codes.DATA)
+    return CliError(f"E403 {path}: no such file, and no number of `force-gateway recordings list`", exit_codes.DATA)
 
 
 def disk_hangs(observation: str) -> CliError:

@@ -208,9 +208,9 @@ class StateChoice:
     @property
     def rig(self) -> str:
         """The rig that is meant: whose directory it is, where none was named. Asked for only by who needs its files."""
-        from gateway.cli.command_line.known_rigs import choose_rig
+        from gateway.cli.command_line.known_rigs import choose_rig, file_of
 
-        return self.named or choose_rig(None, self.path)
+        return file_of(self.named, self.directory) if self.named else choose_rig(None, self.path)
 
     @property
     def directory(self) -> Path:

@@ -324,7 +324,5 @@ def _check_load_cell(profile: DeviceProfile) -> None:
     for text, _ in profile.reading.beyond_range:
         free = (one for one in compile_template(text).fields if one.name not in profile.constants)
         if not all(isinstance(one, Choice) for one in free):
-            raise TemplateError(
-                f"{quote(text)} of overload or underload carries no number and no text: nothing changes in it but words and "
-                "constants"
-            )
+            why = "carries no number and no text: nothing changes in it but words and constants"
+            raise TemplateError(f"{quote(text)} of overload or underload {why}", written=text)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gateway.profiles.kinds.file_kind import CALLED
     from gateway.profiles.kinds.plants import Origin, PlantProfile
     from gateway.profiles.load import load_calibration, load_device, load_plant, load_register_map
-    from gateway.profiles.rigs.assembly import Report, check_report, load_rig
+    from gateway.profiles.rigs.assembly import Report, check_report, load_rig, read_rig
     from gateway.profiles.rigs.rig import CellLine, OutputLine, Rig
     from gateway.profiles.rigs.rig_file import Network, ResidualWatch
     from gateway.profiles.strict_yaml.faults import ProfileError, ProfileFault
@@ -43,6 +43,7 @@ __all__ = [
     "load_plant",
     "load_register_map",
     "load_rig",
+    "read_rig",
     "shipped_profiles_folder",
 ]
 _HOMES: Final = {
@@ -60,6 +61,7 @@ _HOMES: Final = {
     "Report": "rigs.assembly",
     "check_report": "rigs.assembly",
     "load_rig": "rigs.assembly",
+    "read_rig": "rigs.assembly",
     "CellLine": "rigs.rig",
     "OutputLine": "rigs.rig",
     "Rig": "rigs.rig",

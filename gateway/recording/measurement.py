@@ -200,4 +200,4 @@ def _check_enough(recording: Recording, axis: TimeAxis, usable: Flags, notes: li
     if rows >= FEWEST_ROWS and duration_s >= SHORTEST_S:
         return
     why = f"; {'; '.join(notes)}" if notes else ""
-    raise RecordingError(f"{recording.path}: {rows} usable rows in {duration_s:.4g} s: {_NEEDED}{why}")
+    raise RecordingError(f"{recording.path}: {rows} usable rows in {duration_s:.7g} s: {_NEEDED}{why}")

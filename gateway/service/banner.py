@@ -226,9 +226,5 @@ def _valve_lines(ready: Ready) -> list[str]:
 def _lease(rig: Rig) -> str:
     lease_s = rig.control.supervision.lease_s
     if lease_s is None:
-        return (
-            "none (demo): a command lasts until the next one"
-            if rig.simulated
-            else "none: a command lasts until the next one"
-        )
+        return "none: a command lasts until the next one"
     return f"{lease_s * 1e3:.0f} ms, then {rig.control.supervision.lease_action.value}"

@@ -42,7 +42,7 @@ def test_the_banner_says_where_and_what_and_how_to_try() -> None:
         "127.0.0.1:5020   units 0, 1, 255",
         "/dev/pts/4       smc-itv-rc 9600  ok   0.000 V",
         "/dev/pts/6       stream-st-gs 115200  ok   0.00 N",
-        "none (demo): a command lasts until the next one",
+        "lease        none: a command lasts until the next one",
         "mbpoll -1 -p 5020 -r 1 127.0.0.1 1 1200",
         "READY  loop 100 Hz · Ctrl-C ramps the force to 0 and stops · not a safety device",
     ):
@@ -178,7 +178,9 @@ def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:
 def test_a_lease_is_told_with_its_length_and_what_follows() -> None:
     rig = with_supervision(demo(), lease_s=0.2, lease_action=LeaseAction.RAMP)
     assert "lease        200 ms, then ramp" in format_banner(ready(rig=rig))
-    assert "none: a command lasts until the next one" in format_banner(ready(rig=replace(demo(), simulated=False)))
+    for simulated in (False, True):  # of a rig of one's own, tried with --sim, it said "none (demo)"
+        text = format_banner(ready(rig=replace(demo(), simulated=simulated)))
+        assert "lease        none: a command lasts until the next one" in text
 
 
 def test_the_json_line_is_json_and_tells_the_ports() -> None:

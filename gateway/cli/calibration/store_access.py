@@ -97,9 +97,9 @@ def _exit_code(reason: int) -> int:
 
 
 def _rig(name: str) -> "Rig | None":
-    from gateway.profiles import ProfileError, load_rig
+    from gateway.profiles import ProfileError, read_rig
 
     try:
-        return load_rig(name)
+        return read_rig(name)
     except ProfileError:
         return None

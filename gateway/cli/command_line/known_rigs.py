@@ -15,13 +15,11 @@ from gateway.plain_file import expand_home
 
 
 def running_rigs() -> list[str]:
-    """Return the names of the state directories whose gateway answers on this machine."""
-    from gateway.cli.master.local_gateways import is_answering
+    """Return the names of the state directories whose gateway runs on this machine."""
+    from gateway.cli.master.local_gateways import is_there
     from gateway.service.supervisor.run_options import default_state_root
 
-    return [
-        path.parent.name for path in sorted(default_state_root().glob("*/control.sock")) if is_answering(path.parent)
-    ]
+    return [path.parent.name for path in sorted(default_state_root().glob("*/control.sock")) if is_there(path.parent)]
 
 
 def rigs_with_state() -> list[str]:
@@ -100,6 +98,18 @@ def choose_rig(given: str | None, state: Path | None) -> str:
         return _rig_on(state) or defaults.RIG
     running = running_rigs()
     return running[0] if len(running) == 1 else defaults.RIG
+
+
+def file_of(name: str, state: Path) -> str:
+    """Return the file of a rig of one's own that runs on this state directory: by its name it is known to no other folder.
+    The name as it is where it is shipped or a file, or where nobody says."""
+    from gateway.cli.master.local_gateways import rig_running_on
+
+    path = expand_home(name)
+    if name in _shipped() or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
+        return name
+    found = rig_running_on(state)
+    return found if found and Path(found).is_file() else name
 
 
 def _rig_on(state: Path) -> str | None:

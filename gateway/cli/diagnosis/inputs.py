@@ -75,7 +75,7 @@ def read_sources(
     """
     paths = tuple(recording_path(name, rig, state) for name in names)
     refuse_twice(paths)
-    known = _load_rig(rig) if rig else None
+    known = _read_rig(rig) if rig else None
     mapping = column_mapping(columns)
     recordings = [read_table(path, mapping) for path in paths]
     measurements = tuple(
@@ -172,10 +172,10 @@ def _unknown_settings(recordings: Sequence[Recording]) -> list[str]:
     ]
 
 
-def _load_rig(name: str) -> "Rig":
-    from gateway.profiles import load_rig
+def _read_rig(name: str) -> "Rig":
+    from gateway.profiles import read_rig
 
-    return load_rig(name)
+    return read_rig(name)
 
 
 def _quantum_n(rig: "Rig | None") -> float:

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from gateway.cli import control_socket
-from gateway.cli.errors import CliError
+from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.master.wires import Wire
 
 
@@ -50,6 +50,12 @@ def rig_running_on(directory: Path) -> str | None:
     return file if name not in list_shipped("rig") and Path(file).is_file() else name
 
 
-def is_answering(directory: Path) -> bool:
-    """Decide whether a gateway of this user runs on this state directory now."""
-    return bool(_ask_what_runs(directory))
+def is_there(directory: Path) -> bool:
+    """Decide whether a gateway of this user runs on this state directory now. One that stands still does: without it another
+    one would be the only one, and a verb that names none would press there."""
+    try:
+        return bool(control_socket.ask(directory, {"do": "running"}))
+    except NoAnswerError:
+        return True
+    except CliError:
+        return False

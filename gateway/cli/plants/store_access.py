@@ -13,7 +13,7 @@ from gateway.numbered_documents.store import StoredDocument, StoreError
 from gateway.plants.in_use import compensation_on, with_cell_terms
 from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
 from gateway.processes import exit_codes
-from gateway.profiles import PlantProfile, ProfileError, Rig, load_plant, load_rig
+from gateway.profiles import PlantProfile, ProfileError, Rig, load_plant, read_rig
 
 if TYPE_CHECKING:
     from gateway.cli.diagnosis.inputs import Sources
@@ -48,7 +48,7 @@ def load_rig_or_none(state: StateChoice) -> Rig | None:
     from gateway.calibrations.store import CalibrationStore
 
     try:
-        rig = load_rig(state.rig)
+        rig = read_rig(state.rig)
     except ProfileError:
         return None
     calibration = CalibrationStore(state.directory, rig.calibration).find_selected().document
@@ -61,7 +61,7 @@ def find_plant(state: StateChoice, which: str) -> PlantProfile:
         return load_plant(which)
     if int(which):
         return load_stored(open_store(state.directory), int(which)).profile
-    rig = load_rig(state.rig)
+    rig = read_rig(state.rig)
     if rig.plant_profile is None:
         raise CliError(f"E433 rig {rig.name} names no plant of its own", exit_codes.DATA)
     return rig.plant_profile

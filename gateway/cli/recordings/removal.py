@@ -42,11 +42,11 @@ def _cure(why: str, path: Path) -> str:
 
 def retention_of(state: StateChoice, days: float | None, most_bytes: int | None) -> "Retention":
     """Return what the options say, else the rig. CliError (78) where neither limits anything."""
-    from gateway.profiles import load_rig
+    from gateway.profiles import read_rig
     from gateway.profiles.recordings_section import Retention
 
     given = Retention(days=days, bytes=most_bytes)
-    retention = load_rig(state.rig).retention if given.is_unlimited else given
+    retention = read_rig(state.rig).retention if given.is_unlimited else given
     if retention.is_unlimited:
         raise CliError(
             f"rig {state.rig} retains everything: give --days or --bytes, or have "

@@ -8,7 +8,7 @@ from gateway.cli.options import StateChoice
 from gateway.plain_file import expand_home
 from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
-from gateway.profiles import Rig, list_shipped, load_calibration, load_rig
+from gateway.profiles import Rig, list_shipped, load_calibration, read_rig
 from gateway.recording import Recording
 from gateway.recording.calibrations_used import later_calibrations, tell_changes
 from gateway.service.replayed_control import ReplaySetup
@@ -23,7 +23,7 @@ def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, li
     named = recording.header.get("rig")
     rig = rig_of(recording)
     if rig is None and named and expand_home(meant := state.rig).is_file():
-        given = load_rig(meant)
+        given = read_rig(meant)
         rig = given if given.name == named else None
     if rig is None:
         what = f"its rig {named} is not known here: give that rig's file by --rig" if named else "it names no rig"
@@ -75,7 +75,7 @@ def other_setup(which: str, own: ReplaySetup, state: StateChoice) -> ReplaySetup
     if which.isdecimal():
         calibration = find_calibration(open_store(state.directory, own.rig.name), which)
     elif _is_rig(which):
-        rig = load_rig(which)
+        rig = read_rig(which)
         return ReplaySetup(
             f"rig {rig.name}, calibration {rig.calibration.number} {rig.calibration.name}", rig, rig.calibration
         )

@@ -20,6 +20,8 @@ MODULE ForceGateway
   !      PERS bool fgEnabled;   PERS num fgStatus{${status_words}};
   !      PERS bool fgEnded;     PERS string fgText;
   !      PERS num fgAlive;      VAR intnum irAlive;
+  !    T_ROB1 sees none of this module's constants and routines: copy
+  !    those that you use there, as FG_T_RESULT and FgResultText.
   !    A SemiStatic task runs on when T_ROB1 stops, whatever stops it.
   !    So T_ROB1 has to show that it runs: its timer, which stops with
   !    it (Stop, E-stop, an error, single steps), counts fgAlive on.
@@ -60,7 +62,8 @@ MODULE ForceGateway
   ! The rig's self-test, which presses, while nothing is enabled:
   !    fgSelfTest:=TRUE;             ! FALSE again ends it sooner
   !    WaitUntil NOT fgSelfTest;
-  ! Then fgTested is TRUE, or fgText says why not; what was found:
+  ! Then fgTested is TRUE, or fgText says why not; what was found
+  ! (A: by your copies of these constants and functions):
   !    TPWrite FgResultText(fgTest{FG_T_RESULT});
   !    TPWrite "leak: "+FgVerdictText(fgTest{FG_T_LEAK});
   ! fgInBand goes TRUE when what fgForce asks for is held; what was

@@ -72,9 +72,7 @@ def check_report(name: str | Path, *, simulated: bool = False) -> Report:
     simulated: its devices will be simulated, so no port is needed; rig is `as_simulated` then. One whose file says so itself
     serves its masters on the ports that it names, and those are judged as ever.
     """
-    findings = Findings()
-    opened = open_profile("rig", refer_to(name), findings)
-    rig = _rig(opened[0], opened[1], findings) if opened else None
+    rig, findings = _read(name)
     needs_no_port = simulated and not (rig and rig.simulated)
     faults = findings.faults + ([] if needs_no_port else findings.hardware)
     if rig and simulated:
@@ -94,6 +92,22 @@ def load_rig(name: str | Path, *, simulated: bool = False) -> Rig:
     if report.rig is None:
         raise ProfileError(report.faults)
     return report.rig
+
+
+def read_rig(name: str | Path) -> Rig:
+    """Return a rig as its files have it, for who opens none of its ports: one that is still to be edited, and is rehearsed
+    meanwhile, has a map, limits, a plant and a calibration all the same. ProfileError with every other fault."""
+    rig, findings = _read(name)
+    if rig is None or findings.faults:
+        raise ProfileError(_in_order(findings.faults))
+    return rig
+
+
+def _read(name: str | Path) -> tuple[Rig | None, Findings]:
+    """Return the rig, None where a part of it is missing, and all that was found in its files."""
+    findings = Findings()
+    opened = open_profile("rig", refer_to(name), findings)
+    return (_rig(opened[0], opened[1], findings) if opened else None), findings
 
 
 def _in_order(faults: Iterable[ProfileFault]) -> tuple[ProfileFault, ...]:

@@ -29,13 +29,13 @@ def fit_and_store(recording: Path, rig_name: str, state: Path) -> dict[str, Any]
     from gateway.bsfm.ladder.ladder_error import LadderError
     from gateway.calibrations.store import CalibrationStore
     from gateway.numbered_documents.store import StoreError
-    from gateway.profiles import ProfileError, load_rig
+    from gateway.profiles import ProfileError, read_rig
     from gateway.recording import RecordingError
     from gateway.service.fitting.ladder_fit import calibration_of, fit_recording
     from gateway.service.fitting.ladder_source import RigContext, read_source
 
     try:
-        rig = load_rig(rig_name)
+        rig = read_rig(rig_name)
         store = CalibrationStore(state, rig.calibration)
         selected = store.find_selected().document or rig.calibration
         has_span = selected.blend_span_n > 0.0 or not selected.slip_radii_v  # with stops a master may leave it 0

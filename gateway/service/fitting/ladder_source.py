@@ -14,7 +14,7 @@ from gateway.bsfm.ladder.check import CheckedLadder, Expectation, check_ladder, 
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.bsfm.ladder.rows import FORCE_UNITS, OVERLOADED
 from gateway.calibrations.store import calibration_in_use
-from gateway.profiles import ProfileError, Rig, load_rig
+from gateway.profiles import ProfileError, Rig, read_rig
 from gateway.recording import (
     ColumnMapping,
     Recording,
@@ -134,7 +134,7 @@ def expectation(recording: Recording, context: RigContext) -> tuple[Expectation,
     fingerprint = recording.header.get("rig_fingerprint")
     if rig is not None and fingerprint and fingerprint != rig.fingerprint and recorded == rig.name:
         rig_notes.append(f"the files of rig {rig.name} have changed since the recording was made")
-    fallback_rig = rig or load_rig(_DEFAULT_RIG)
+    fallback_rig = rig or read_rig(_DEFAULT_RIG)
     plant = rig.plant if rig else None
     expected = Expectation(
         reference=reference.model() if reference else fallback_rig.calibration.model(),
@@ -171,7 +171,7 @@ def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
     if not name:
         return None, []
     try:
-        return load_rig(name), []
+        return read_rig(name), []
     except ProfileError:
         if file and (rig := _from_file(file)) and rig.name == name:
             return rig, []
@@ -180,7 +180,7 @@ def find_rig(name: str, file: str) -> tuple[Rig | None, list[str]]:
 
 def _from_file(file: str) -> Rig | None:
     try:
-        return load_rig(file)
+        return read_rig(file)
     except ProfileError:
         return None
 

@@ -7,9 +7,12 @@ import pytest
 
 from gateway.cli import control_socket
 from gateway.cli.command_line import known_rigs, rig_choice
-from gateway.cli.options import state_directory
+from gateway.cli.errors import NoAnswerError
+from gateway.cli.options import StateChoice, state_directory
+from gateway.processes import exit_codes
 from gateway.processes.event_file import EventFile
 from gateway.processes.event_log import EventLog
+from gateway.processes.state_directory import CONTROL_SOCKET
 from gateway.profiles import shipped_profiles_folder
 from gateway.recording import Recorder
 
@@ -76,6 +79,39 @@ def test_without_one_it_is_the_rig_that_runs_here(root: Path, monkeypatch: pytes
     monkeypatch.setattr(known_rigs, "running_rigs", lambda: ["demo", "my-cell"])
     assert state_directory(None, None) == root / "demo", "of two nobody knows which is meant"
     assert state_directory(root, None) == root
+
+
+def test_one_that_stands_still_is_one_of_two(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While cell-a hung a ladder that was meant for it was climbed by cell-b, which alone answered: the one that runs."""
+
+    def answer(state: Path, request: dict[str, Any]) -> dict[str, Any]:
+        if state.name == "cell-a":
+            raise NoAnswerError("E140 no gateway answers", exit_codes.DEVICE)
+        return {"rig": state.name}
+
+    for name in ("cell-a", "cell-b"):
+        (root / name).mkdir()
+        (root / name / CONTROL_SOCKET).touch()
+    monkeypatch.setattr(control_socket, "ask", answer)
+    assert known_rigs.running_rigs() == ["cell-a", "cell-b"]
+    assert state_directory(None, None) == root / "demo", "nobody knows which is meant"
+    (root / "cell-a" / CONTROL_SOCKET).unlink()
+    assert state_directory(None, None) == root / "cell-b"
+
+
+def test_one_that_runs_is_read_by_its_file_wherever_it_lies(
+    root: Path, tmp_path: Path, call, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From another folder its bundle had no rig in it, and its own calibration, plant and retention were not found."""
+    file = tmp_path / "elsewhere" / "my-cell.yaml"
+    file.parent.mkdir()
+    text = (shipped_profiles_folder() / "rigs" / "demo.yaml").read_text(encoding="utf-8")
+    file.write_text(text.replace("name: demo", "name: my-cell"), encoding="utf-8")
+    monkeypatch.setattr(control_socket, "ask", lambda state, request: {"rig": "my-cell", "file": str(file)})
+    assert StateChoice(None, "my-cell").rig == str(file) and StateChoice(None, "demo").rig == "demo"
+    assert "(the rig's own)" in call("calibration", "list", "--rig", "my-cell").output
+    file.unlink()
+    assert StateChoice(None, "my-cell").rig == "my-cell"
 
 
 def test_a_directory_alone_is_of_the_rig_that_runs_on_it_or_was_recorded_there(

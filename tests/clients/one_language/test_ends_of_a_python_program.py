@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from math import isnan
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.programs.python_program import PythonProgram, SocketAtHand
-from tests.clients.scenes import TEXTS, command, commands, cycles
+from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 
 
 @pytest.fixture
@@ -110,3 +111,23 @@ def test_what_the_gateway_has_no_value_for_is_no_number(program: PythonProgram) 
     for name, _, kind, counts in python["STATUS"]:
         assert isnan(status[name]) if kind == "int16" else status[name] != -0x8000 / counts, name
     assert isnan(status["force_measured"])
+
+
+@pytest.mark.parametrize(
+    ("slip", "told"),
+    [
+        ({"slip_stop": 3}, "slip_stop"),
+        ({"order": 2.0}, "order = 2.0 is no uint16"),
+        ({"lag": 1e39}, "lag = 1e+39 is no float32"),
+    ],
+)
+def test_a_set_with_a_slip_of_the_pen_is_not_staged(
+    program: PythonProgram, gateway: GatewayAtHand, slip: dict[str, float], told: str
+) -> None:
+    """A name that no set has was left out, and the set put to use without what was meant by it; an order of 2.0 was a
+    struct.error that names nothing."""
+    with pytest.raises(ValueError, match=re.escape(told)):
+        program.client.stage(MODEL | slip)
+    with pytest.raises(ValueError, match="force_setpont is no word of the command"):
+        program.client.set("force_setpont", 3.0)
+    assert gateway.uploads == [] and gateway.writes == []

@@ -163,3 +163,15 @@ def test_the_interpreter_finds_a_name_that_nobody_declared() -> None:
     machine.begin()
     with pytest.raises(NameError, match="nowhere"):
         machine.start("p")
+
+
+def test_a_motion_program_beside_the_task_of_an_irc5_is_told_what_it_does_not_see() -> None:
+    """Tasks share persistent data alone: of the example for both cases T_ROB1 would know neither FgResultText nor FG_T_LEAK."""
+    head, module = TEXTS["rapid"].split("! ---- where the gateway is", 1)
+    beside, both = head.split("! Use in T_ROB1, both cases:", 1)
+    shared = set(re.findall(r"PERS \w+ (\w+)", module))
+    unseen = {name for name in re.findall(r"\b(?:FG_|[fF]g[A-Z])\w+", both) if name not in shared}
+    assert {"FgResultText", "FG_T_LEAK"} <= unseen
+    assert "T_ROB1 sees none of this module's constants and routines: copy" in " ".join(
+        re.sub(r"!", " ", beside).split()
+    )

@@ -12,6 +12,7 @@ import pytest
 from gateway.bsfm.fit.model_error import Error
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.calibrations.store import CalibrationStore
+from gateway.cli.setup.starter_rig import starter_rig
 from gateway.numbered_documents.store import StoreError
 from gateway.profiles import load_rig
 from gateway.recording import RecordingError
@@ -65,6 +66,13 @@ def test_the_same_data_is_stored_once_and_told_by_its_number_again(fits: Fits, t
     assert len(fits.reports) == 2 and Path(first["document"]).exists()
     fits.made = calibration(9)
     assert fit_and_store(tmp_path / "2.fgr", "demo", tmp_path)["stored"] == 3
+
+
+def test_a_ladder_of_a_rig_without_ports_yet_is_fitted(fits: Fits, tmp_path: Path) -> None:
+    """A minute's ladder of a rehearsed rig, as `init` writes it, ended with "output.port is a placeholder"."""
+    rig = tmp_path / "cell.yaml"
+    rig.write_text(starter_rig("cell"))
+    assert fit_and_store(tmp_path / "1.fgr", str(rig), tmp_path)["stored"] == 2
 
 
 def test_a_fit_that_is_not_offered_is_told_with_its_number_and_why(fits: Fits, tmp_path: Path) -> None:

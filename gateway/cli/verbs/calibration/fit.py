@@ -180,10 +180,10 @@ def _beside(path: Path) -> Path:
 def _store(fit: "LadderFit", options: dict[str, Any]) -> int:
     from gateway.bsfm.ladder.ladder_error import LadderError
     from gateway.calibrations.store import CalibrationStore
-    from gateway.profiles import load_rig
+    from gateway.profiles import read_rig
     from gateway.service.fitting.ladder_fit import calibration_of
 
-    rig = load_rig(options["rig"] or fit.document["rig"] or defaults.RIG)
+    rig = read_rig(options["rig"] or fit.document["rig"] or defaults.RIG)
     state = state_directory(options["state"], rig.name)
     try:
         calibration = calibration_of(fit, rig.load_cell.range_n)

@@ -184,9 +184,9 @@ def _question(verb: str, options: dict[str, Any]) -> dict[str, Any]:
     """Everything besides the file that an answer depends on."""
     from gateway import VERSION
     from gateway.plain_file import read_plain
-    from gateway.profiles import load_rig
+    from gateway.profiles import read_rig
 
-    rig = load_rig(options["rig"]).fingerprint if options["rig"] else ""
+    rig = read_rig(options["rig"]).fingerprint if options["rig"] else ""
     mapping = read_plain(options["columns"]).decode() if options["columns"] else ""
     return {"verb": verb, "version": VERSION, "rig": rig, "columns": mapping}
 

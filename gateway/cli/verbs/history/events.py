@@ -2,6 +2,8 @@
 
 import contextlib
 import json
+import select
+import sys
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -62,9 +64,21 @@ def _events_of(reader: EventReader, after: str, follow: bool) -> Iterator[EventR
     """Yield what is younger; what comes while we look is so, whatever the clock says meanwhile."""
     younger = YoungerRecords(after)
     yield from (event for event in reader.read_stored() if younger.includes(event.time))
-    while follow:
-        time.sleep(_POLL_S)
+    while follow and not _left_alone(_POLL_S):
         yield from reader.read_new()
+
+
+def _left_alone(within_s: float) -> bool:
+    """Wait, and return whether meanwhile or before whoever read our stdout has gone: behind `| grep -m1 A310` no further event
+    may be wanted for days, and only a write would tell."""
+    try:
+        out = sys.stdout.fileno()
+    except (AttributeError, OSError, ValueError):  # none, closed, or no file
+        time.sleep(within_s)
+        return False
+    poll = select.poll()
+    poll.register(out, 0)  # errors and hang-ups only
+    return bool(poll.poll(within_s * 1e3))
 
 
 def _show(events: Iterator[EventRecord], wanted: Callable[[EventRecord], bool], as_json: bool) -> None:

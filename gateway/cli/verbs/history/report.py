@@ -25,11 +25,11 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
     or not.
     """
     from gateway.cli.support_bundle import collect_parts, pack_bundle, parts_missing
-    from gateway.profiles import load_rig
+    from gateway.profiles import read_rig
 
     if file.exists() and not (force or show):
         raise already_exists(file)
-    parts = collect_parts(state.directory, lambda: load_rig(state.rig).texts.items())
+    parts = collect_parts(state.directory, lambda: read_rig(state.rig).texts.items())
     if show:
         click.echo("\n".join(f"== {name}\n{text}" for name, text in parts.items()))
         return

@@ -39,7 +39,7 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
     from gateway.profiles import load_register_map
     from gateway.registers import render_registers
 
-    chosen = _load_rig(rig) if rig else None
+    chosen = _read_rig(rig) if rig else None
     register_map = (
         chosen.register_map if chosen and not map_name else load_register_map(map_name or defaults.REGISTER_MAP)
     )
@@ -60,11 +60,11 @@ def command(*, name: str | None, form: str | None, map_name: str | None, rig: st
         raise CliError(f"E185 {error}") from None
 
 
-def _load_rig(name: str) -> "Rig":
+def _read_rig(name: str) -> "Rig":
     """Import what a rig needs only for who names one."""
-    from gateway.profiles import load_rig
+    from gateway.profiles import read_rig
 
-    return load_rig(name)
+    return read_rig(name)
 
 
 def _show_card(register_map: "RegisterMap", name: str, form: str | None) -> None:

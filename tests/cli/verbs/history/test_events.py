@@ -1,6 +1,7 @@
 """`events`: what was said, as it was said; filters, forms, and files that are not whole."""
 
 import json
+import os
 import threading
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pytest
 
 from gateway.cli.verbs.history import events as verb
 from gateway.processes.event import encode_event, make_event, utc_text
-from gateway.processes.event_file import EventFile
+from gateway.processes.event_file import EventFile, EventReader
 
 NOON_S = 1_795_348_800.0
 SAID = [
@@ -119,6 +120,17 @@ def test_following_shows_what_comes(state: Path, call, monkeypatch) -> None:
     answer = call("events", "--state", state, "--follow", "--json", "--severity", "error")
     file.close()
     assert codes(answer.output) == ["A401", "A313"]
+
+
+def test_following_ends_with_who_reads_it(state: Path, monkeypatch) -> None:
+    """`events --follow | grep -m1 A310` stood behind its line until another wanted event came, which may be days."""
+    read_end, write_end = os.pipe()
+    with os.fdopen(write_end, "w") as out, EventReader(state) as reader:
+        monkeypatch.setattr(verb.sys, "stdout", out)
+        monkeypatch.setattr(verb.time, "sleep", lambda seconds: pytest.fail("it waited"))
+        assert not verb._left_alone(0.0), "it is read"
+        os.close(read_end)
+        assert len(list(verb._events_of(reader, "", follow=True))) == len(SAID)
 
 
 @pytest.mark.parametrize("since", ["10m", "2026-11-22T11:50"])
