@@ -110,3 +110,27 @@ def test_what_the_gateway_has_no_value_for_is_no_number(program: PythonProgram) 
     for name, _, kind, counts in python["STATUS"]:
         assert isnan(status[name]) if kind == "int16" else status[name] != -0x8000 / counts, name
     assert isnan(status["force_measured"])
+
+
+def test_an_answer_that_comes_byte_by_byte_has_no_more_time_than_any(
+    program: PythonProgram, gateway: GatewayAtHand
+) -> None:
+    """A program that waits for each byte anew does not get to what lets its force go."""
+
+    class Dripping(SocketAtHand):
+        def __init__(self) -> None:
+            super().__init__(gateway)
+            self.settimeout = self._wait_for
+
+        def _wait_for(self, seconds: float) -> None:
+            self._patience_s = seconds
+
+        def recv(self, count: int) -> bytes:
+            program.now_s += min(0.2, self._patience_s)
+            if self._patience_s < 0.2:
+                raise TimeoutError("no answer")
+            return super().recv(1)
+
+    program.module["socket"].create_connection = lambda *_: Dripping()
+    program.cycle(0.0)
+    assert program.text.startswith("lost: ") and program.now_s <= program.client.timeout_s + 0.01
