@@ -71,4 +71,8 @@ DEFECTS = (
            "            self._socket.settimeout(max(0.001, until_s - time.monotonic()))\n",
            "",
            ("clients/one_language/test_ends_of_a_python_program.py",)),
+    Defect("a Python program's lease ends while a disk is slow with its commit", "clients/templates/python.txt",
+           "            self._beat_on()\n",
+           "",
+           ("clients/uploads/test_client_uploads.py",)),
 )  # fmt: skip
