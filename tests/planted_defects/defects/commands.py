@@ -167,4 +167,8 @@ DEFECTS = (
            ("control/commands/test_command_edges.py",)),
     Defect("a payload that is no number is read over behind a good one", "control/demand.py",
            "        and one.payload_kg == other.payload_kg\n", "", ("control/commands/test_commands.py",)),
+    Defect("a hold whose time is over drops its force", "cli/force_hold/heartbeat.py",
+           "                    self.stopping.set()\n",
+           "                    self.dropping.set()\n",
+           ("cli/force_hold/test_hold_verb.py",)),
 )  # fmt: skip
