@@ -189,4 +189,8 @@ DEFECTS = (
            "        return max(rising[0], falling[0]), min(rising[-1], falling[-1])\n\n    def model",
            "        return rising[0], rising[-1]\n\n    def model",
            ("registers/bank/test_staging.py",)),
+    Defect("a fit may be worse by a twentieth of a newton, whatever the band", "service/fitting/acceptance.py",
+           "other.rms_n + WORSE_SHARE * tolerance_n)",
+           "other.rms_n + WORSE_SHARE)",
+           ("service/fitting/test_acceptance.py",)),
 )  # fmt: skip
