@@ -126,7 +126,6 @@ class Connection(asyncio.Protocol):
     def _admit(self, now_s: float) -> None:
         shared = self._shared
         self._admitted = True
-        self._last_answer_s = now_s
         shared.peers.join(self.peer.host)
         shared.connections[self] = None
         self._rate = shared.peers.rate(self.peer.host, now_s)

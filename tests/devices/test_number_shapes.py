@@ -135,3 +135,6 @@ def test_twos_complement_comes_back() -> None:
     compiled = compile_template("{x:+04X}")
     for number in (-32768, -1, 0, 1, 32767):
         assert compiled.decode(compiled.encode({"x": number})) == {"x": number}
+    for number in (-32769, 32768):  # which would come back as the other end
+        with pytest.raises(ValueRefused, match="does not fit in 4 characters with a sign"):
+            compiled.encode({"x": number})

@@ -110,6 +110,25 @@ def test_a_shortage_is_told_once_a_minute_and_waited_for(
     run(main())
 
 
+def test_a_shortage_that_comes_back_behind_a_quiet_time_is_told_again(
+    run: Any, serve: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(listener, "_PAUSE_S", 0.001)
+    monkeypatch.setattr(listener, "_QUIET_S", 0.0)  # each pause between two tries is longer
+
+    async def main() -> None:
+        async with serve() as running:
+            with accepting(OSError(errno.ENOMEM, "no room"), running.server._listener) as tries:
+                _, writer = await running.connect()
+                async with asyncio.timeout(10):
+                    while tries[0] < 3:
+                        await asyncio.sleep(0.001)
+            assert [sentence[:4] for _, sentence in running.log][:3] == ["W248"] * 3
+            writer.close()
+
+    run(main())
+
+
 def test_a_connection_that_was_lost_before_it_was_taken_is_no_defect(run: Any, serve: Any) -> None:
     async def main() -> None:
         defects: list[Any] = []

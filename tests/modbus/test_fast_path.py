@@ -76,6 +76,8 @@ frames = st.builds(Adu, st.integers(0, 0xFFFF), st.sampled_from([1, 2]), st.bina
 @given(st.one_of(nearly, frames, st.binary(max_size=40)))
 @example(pack(">HHHBB", 1, 0, 255, 1, 0x41) + bytes(253))  # longer than any frame
 @example(pack(">HHHBBHHB", 1, 0, 255, 1, 16, 0, 124, 248) + bytes(248))  # and a write of more than is allowed
+@example(pack(">HHHBBHHB", 1, 7, 9, 1, 16, 0, 1, 2) + bytes(2))  # another protocol, of a block
+@example(pack(">HHHBBHH", 1, 7, 6, 1, 6, 0, 1))  # and of one word
 @example(pack(">HHHBBHHB", 1, 0, 10, 1, 16, 0, 1, 2) + bytes(2))  # a byte of it is still to come
 @example(pack(">HHHBBHHB", 1, 0, 8, 1, 16, 0, 1, 2) + bytes(2))  # it is one too many
 def test_any_segment_is_answered_as_the_long_way_or_left_to_it(segment: bytes) -> None:

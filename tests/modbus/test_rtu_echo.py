@@ -147,7 +147,7 @@ def test_a_terminal_has_no_echo_also_when_it_was_opened_again() -> None:
 def test_another_adapter_may_be_otherwise() -> None:
     bus = Bus()
     for _ in range(2):  # the second request shows that the first one's answer has not come back
-        exchange(bus, READ)
+        exchange(bus.pause(0.1), READ)
     bus.receiver.forget()
     assert exchange(bus, WRITE, echo_s=ANSWER_S + 1e-3) == 1
 

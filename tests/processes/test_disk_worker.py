@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gateway.processes.disk_worker import DiskWorker
+from gateway.processes.disk_worker import DiskWorker, keep_end
 from tests.disk.threads import join_disk_threads
 
 
@@ -120,3 +120,11 @@ def test_work_that_calculates_does_not_hold_up_the_loop(own_turns: None) -> None
     calculated_s = asyncio.run(main())
     assert join_disk_threads() <= 1
     assert calculated_s[30] < 1.9e-3  # the loop sleeps for one of them
+
+
+def test_the_ends_of_the_last_eight_jobs_are_known_and_no_more() -> None:
+    """They are told with each status: of a year of jobs the answer would outgrow its line."""
+    ends: dict[str, dict[str, Any]] = {}
+    for job in range(1, 21):
+        keep_end(ends, job, said=f"job {job}")
+    assert ends == {str(job): {"said": f"job {job}"} for job in range(13, 21)}

@@ -139,8 +139,8 @@ def test_the_cause_of_an_unclean_end_is_readable_whatever_the_words_are(
 def test_the_bank_holds_to_the_rigs_limits() -> None:
     rig = demo()
     rig = replace(rig, network=replace(rig.network, owner="10.0.0.7", require_byte_order_echo=True))
-    rules = bank_rules(rig)
-    limits = rig.control.limits
+    limits = replace(rig.control.limits, voltage_min_v=0.5, safe_voltage_v=0.5)
+    rules = bank_rules(rig := replace(rig, control=replace(rig.control, limits=limits)))
     assert (rules.rig_name, rules.force_max_n) == ("demo", limits.force_max_n)
     assert (rules.voltage_min_v, rules.voltage_max_v) == (limits.voltage_min_v, limits.voltage_max_v)
     assert rules.payload_max_kg == pytest.approx(rig.load_cell.range_n / 9.80665)

@@ -62,6 +62,15 @@ def test_what_is_no_token_is_no_guess(tmp_path: Path) -> None:
     assert ask(app, RIGHT_LOGIN).status == 200
 
 
+def test_a_slip_of_an_hour_ago_pays_for_no_later_guess() -> None:
+    guesses, later_s = TokenGuesses(), 3600.0
+    guesses.note_wrong(HERE, 0.0)
+    for _ in range(GUESSES_AT_ONCE):
+        assert guesses.wait_s(HERE, later_s) == 0
+        guesses.note_wrong(HERE, later_s)
+    assert guesses.wait_s(HERE, later_s) == GUESS_S
+
+
 def test_guesses_are_remembered_in_bounds() -> None:
     """Of IPv6 each guesser has 2^64 addresses, and a proxy may name anything at all."""
     guesses = TokenGuesses()

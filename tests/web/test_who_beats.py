@@ -190,6 +190,18 @@ def test_a_browser_that_leaves_is_not_there_for_longer_than_one_that_stays_silen
     play(tmp_path, scene)
 
 
+def test_another_browser_that_leaves_takes_nothing_from_the_one_that_commands(tmp_path: Path) -> None:
+    async def scene(commands: Commands, stage: Stage) -> None:
+        for name in ("me", "you"):
+            commands.join(name)
+        await commands.enable("me", 12.0)
+        commands.leave("you")
+        stage.wired.run(2.0)
+        assert commands.is_attended
+
+    play(tmp_path, scene)
+
+
 def test_a_master_that_takes_the_page_s_force_for_moments_ends_no_beat(tmp_path: Path) -> None:
     """Refused beats count in a row: the page's own force would end with its lease."""
 

@@ -11,6 +11,7 @@ from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
 from gateway.cli.calibration import resume, store_access
 from gateway.cli.calibration.resume import RestOfLadder, find_rest_of_ladder
 from gateway.cli.errors import CliError
+from gateway.cli.verbs.calibration.calibrate import _resume
 from gateway.numbered_documents.store import StoreError
 from gateway.processes import exit_codes
 from gateway.recording import RecordingError
@@ -38,6 +39,16 @@ def test_a_run_goes_on_at_the_first_group_that_it_has_not_climbed(
     """With nothing but the walk left it begins behind the last group; without a walk it repeats one."""
     plan = replace(REST, groups=climbed).plan_with(changes)
     assert plan == PLAN | changes | {"first_group": first_group}
+
+
+def test_other_stairs_than_those_that_were_climbed_are_no_rest_of_a_ladder(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its groups would be of two ladders, and one model be fitted to both."""
+    monkeypatch.setattr(resume, "find_rest_of_ladder", lambda _state: REST)
+    for key, value in (("step_v", 0.25), ("v_max_v", 6.0)):
+        with pytest.raises(CliError, match=f"E437 .* not with {key} {value:g}:") as refused:
+            _resume(Path(), {key: value}, "")
+        assert refused.value.exit_code == exit_codes.USAGE
+    assert _resume(Path(), {"step_v": 0.5, "groups": 6}, "").plan["groups"] == 6
 
 
 @pytest.mark.parametrize(

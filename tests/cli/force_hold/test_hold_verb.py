@@ -31,7 +31,8 @@ def test_it_lets_go_by_itself_when_its_time_is_over(time: str, fake: Any, call: 
     done = call("hold", "12", "--for", time, "--json", "--gateway", fake.address)
     assert done.exit_code == 0, done.output
     assert json.loads(done.output.splitlines()[-1]) == {"end": "stopped"}
-    assert fake.bank.writes[0][1][:2] == (1, 1200) and fake.bank.writes[-1][1][:2] == (0, 0)
+    commands = [words[:2] for address, words in fake.bank.writes if not address]
+    assert commands == [(1, 1200), (1, 0), (0, 0)], "by a ramp, not by a drop"
 
 
 def test_its_time_is_over_also_where_nobody_takes_its_lines(fake: Any, call: Any, monkeypatch) -> None:

@@ -1,11 +1,14 @@
-"""What the client of C alone does: words below 0, a close that forgets, a band that ends with the demand, how long it waits."""
+"""What the client of C alone does: words below 0, a close that forgets, a band that ends with the demand, how long it waits,
+what it takes for a value and for an answer."""
 
 from __future__ import annotations
 
 import ctypes
+from math import isnan, nan
 
 import pytest
 
+from gateway.registers import Status
 from tests.clients.gateway_at_hand import GatewayAtHand
 from tests.clients.losses.test_asked_for_while_lost import be_lost
 from tests.clients.programs.c_program import OK, CProgram
@@ -76,3 +79,38 @@ def test_the_pause_before_another_attempt_has_an_end(program: CProgram, gateway:
     gateway.is_cut, before = False, len(gateway.requests)
     program.cycle(4.1)
     assert len(gateway.requests) > before, "4 s are the longest"
+
+
+def test_a_force_that_nobody_knows_is_no_number(program: CProgram, gateway: GatewayAtHand) -> None:
+    """-327.68 N would be a pull that nobody sees, and 0 N behind a loss a tool that rests."""
+    shown = []
+    for force_n in (-1.25, nan):
+        gateway.bank.publish(Status(force_measured_n=force_n))
+        program.cycle()
+        shown.append(program.force_measured_n)
+    assert shown[0] == -1.25 and isnan(shown[1])
+    gateway.bank.publish(Status(force_measured_n=3.5))
+    program.cycle()
+    assert program.force_measured_n == 3.5
+    gateway.is_cut = True
+    program.cycle()
+    assert isnan(program.force_measured_n)
+
+
+def test_what_says_that_it_is_longer_than_any_answer_is_none(program: CProgram, gateway: GatewayAtHand) -> None:
+    """All of it would be written behind the room for one: who serves on the gateway's address need not be a gateway."""
+    gateway.ask = lambda frame: frame[:4] + b"\x00\xff" + frame[6:8] + bytes(253)  # type: ignore[method-assign]
+    program.cycle()
+    assert program.text.endswith("an answer that does not belong to the question")
+
+
+def test_who_enables_anew_has_ended_no_more(program: CProgram, gateway: GatewayAtHand) -> None:
+    program.enable(12.0)
+    cycles(program)
+    gateway.stop_from_elsewhere()
+    cycles(program)
+    assert program.ended
+    program.enable(12.0)
+    assert not program.ended
+    cycles(program)
+    assert program.enabled and not program.ended

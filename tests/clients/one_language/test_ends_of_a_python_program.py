@@ -131,3 +131,27 @@ def test_a_set_with_a_slip_of_the_pen_is_not_staged(
     with pytest.raises(ValueError, match="force_setpont is no word of the command"):
         program.client.set("force_setpont", 3.0)
     assert gateway.uploads == [] and gateway.writes == []
+
+
+def test_an_answer_that_comes_byte_by_byte_has_no_more_time_than_any(
+    program: PythonProgram, gateway: GatewayAtHand
+) -> None:
+    """A program that waits for each byte anew does not get to what lets its force go."""
+
+    class Dripping(SocketAtHand):
+        def __init__(self) -> None:
+            super().__init__(gateway)
+            self.settimeout = self._wait_for
+
+        def _wait_for(self, seconds: float) -> None:
+            self._patience_s = seconds
+
+        def recv(self, count: int) -> bytes:
+            program.now_s += min(0.2, self._patience_s)
+            if self._patience_s < 0.2:
+                raise TimeoutError("no answer")
+            return super().recv(1)
+
+    program.module["socket"].create_connection = lambda *_: Dripping()
+    program.cycle(0.0)
+    assert program.text.startswith("lost: ") and program.now_s <= program.client.timeout_s + 0.01

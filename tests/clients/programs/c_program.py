@@ -41,7 +41,7 @@ def library_of(text: str) -> Any:
         getattr(library, name).restype = ctypes.c_char_p
     for name in ("make", "make_model"):
         getattr(library, name).restype = ctypes.c_void_p
-    library.time_ms.restype = ctypes.c_longlong
+    library.time_ms.restype, library.force_measured.restype = ctypes.c_longlong, ctypes.c_float
     return library
 
 
@@ -167,3 +167,7 @@ class CProgram:
     @property
     def ended(self) -> bool:
         return bool(self._library.has_ended(self._client))
+
+    @property
+    def force_measured_n(self) -> float:
+        return float(self._library.force_measured(self._client))

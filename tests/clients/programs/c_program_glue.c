@@ -62,6 +62,7 @@ fg_client *make(int unit) {
 }
 int is_enabled(const fg_client *client) { return client->status.enabled; }
 int is_in_band(const fg_client *client) { return client->status.in_band; }
+float force_measured(const fg_client *client) { return client->status.force_measured; }
 int has_ended(const fg_client *client) { return client->ended; }
 const char *message(const fg_client *client) { return client->message; }
 const char *fault(const fg_client *client) { return client->status.fault ? fg_fault_text(client->status.fault_code) : ""; }

@@ -15,6 +15,7 @@ from tests.clients.programs.controllers.plc import Plc
 from tests.clients.programs.controllers.s7 import S7
 from tests.clients.programs.controllers.structured_text import Codesys
 from tests.clients.programs.controllers.universal_robot import UniversalRobot
+from tests.clients.programs.python_program import PythonProgram
 from tests.clients.scenes import MAP, MODEL, TEXTS, cycles
 
 
@@ -70,6 +71,20 @@ def test_the_number_that_is_to_blame_is_told_by_its_place_and_none_as_minus_1(
     assert not client.uploaded and any(word in client.text for word in ("range", "span"))
     told = [str(client.output("failing"))] if isinstance(client, Plc) else re.findall(r"number (-?\d+)", client.text)
     assert told == [number]
+
+
+def test_a_python_program_beats_while_it_waits_for_a_slow_commit(gateway: GatewayAtHand) -> None:
+    """It waits for 5 s at most, and no lease lasts as long: its force would end."""
+    program = PythonProgram(TEXTS["python"], gateway)
+    program.enable(4.0)
+    cycles(program)
+    gateway.bank.staging.on_commit = lambda *_: None  # a disk that is busy
+    program.client.stage(MODEL)
+    before = len(gateway.beats)
+    with pytest.raises(program.module["Lost"], match="no commit within"):
+        program.client.commit()
+    beats = gateway.beats[before:]
+    assert len(beats) == len(set(beats)) > 200 and program.enabled
 
 
 def test_the_crc_s_check_value_comes_out() -> None:

@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from gateway.devices import output_device
 from gateway.devices.device_checks.watchdog import Watchdog
+from gateway.devices.messages import Garbage, SetVoltage
 from tests.profile_files import load_device
 
 
@@ -35,3 +37,14 @@ def test_it_is_fed_four_times_in_the_time_that_the_device_has(time_s: float, tic
     watchdog = watchdog_of(time_s, tick_s)
     assert 4.0 * watchdog.feed_period_s == pytest.approx(watchdog.ticks * tick_s)
     assert 4.0 * watchdog.feed_period_s <= time_s * (1.0 + 1e-9)
+
+
+def test_a_simulated_device_obeys_no_setting_from_its_trip_until_it_is_cleared() -> None:
+    """A rehearsal would show force back where a real device stands at its safe value."""
+    device, setting = output_device(load_device("icpdas-702x")), b"#0105.000\r"
+    device.receive(b"~013105\r", 0.0)  # armed, 0.5 s
+    assert device.receive(setting, 0.4) == [SetVoltage(5.0)]
+    (refused,) = device.receive(setting, 1.0)
+    assert isinstance(refused, Garbage) and device.reply(device.refusal(refused)) == b"!\r"
+    device.receive(b"~011\r", 1.1)
+    assert device.receive(setting, 1.2) == [SetVoltage(5.0)]

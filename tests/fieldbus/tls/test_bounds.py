@@ -159,6 +159,11 @@ def test_one_address_has_twenty_handshakes_a_second_and_costs_no_other_any(face:
         face.accept("10.0.0.7").socket.leave()
     assert face.log and all("more than 20 handshakes a second" in told for told in face.log)
     assert not face.accept("10.0.0.8").socket.ended
+    face.clock.advance(0.06)  # of one
+    face.handshakes.sweep(face.clock.time())
+    again = [face.accept("10.0.0.7").socket for _ in range(2)]
+    assert [each.ended for each in again] == ["", "aborted"], "a sweep gives none that were used back"
+    again[0].leave()
     face.clock.advance(1.0)
     face.handshakes.sweep(face.clock.time())
     assert not face.handshakes.rates

@@ -167,4 +167,12 @@ DEFECTS = (
            ("control/commands/test_command_edges.py",)),
     Defect("a payload that is no number is read over behind a good one", "control/demand.py",
            "        and one.payload_kg == other.payload_kg\n", "", ("control/commands/test_commands.py",)),
+    Defect("a hold whose time is over drops its force", "cli/force_hold/heartbeat.py",
+           "                    self.stopping.set()\n",
+           "                    self.dropping.set()\n",
+           ("cli/force_hold/test_hold_verb.py",)),
+    Defect("a ladder is resumed with other stairs", "cli/verbs/calibration/calibrate.py",
+           "if key in _STAIRS and value != rest.plan[key]]",
+           "if key in _STAIRS and not rest.plan]",
+           ("cli/calibration/test_rest_of_a_ladder.py",)),
 )  # fmt: skip

@@ -90,4 +90,12 @@ DEFECTS = (
            "        if not self.is_open and not text.strip(\" +-\"):",
            "        if not self.is_open and not text.strip():",
            ("devices/test_number_shapes.py",)),
+    Defect("a number beyond a signed field's end comes out as its other end", "devices/fields/numbers.py",
+           "if not -self._span <= 2 * number < self._span:",
+           "if not -self._span <= 2 * number <= self._span:",
+           ("devices/test_number_shapes.py",)),
+    Defect("a rehearsed device obeys behind its watchdog's trip", "devices/template_codecs/output_device.py",
+           "            if self.is_tripped:\n                return Garbage(line.data)\n            self._setting = number",
+           "            self._setting = number",
+           ("devices/outputs/test_watchdog_time.py",)),
 )  # fmt: skip

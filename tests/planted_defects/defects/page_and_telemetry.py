@@ -104,4 +104,12 @@ DEFECTS = (
     Defect("a run is let go that begins behind a long silence", "web/tabs/run_follower.py",
            "        self._seen_s = self._clock()\n        self._last = await", "        self._last = await",
            ("web/tabs/test_run_of_the_page.py",)),
+    Defect("a slip of an hour ago pays for a thousand guesses at the page's token", "web/token_guesses.py",
+           "max(self._paid_s.get(key, now_s), now_s) + GUESS_S",
+           "self._paid_s.get(key, now_s) + GUESS_S",
+           ("web/test_token_guesses.py",)),
+    Defect("who only looks on and leaves cuts the time of who commands", "web/commands.py",
+           "        if viewer == self.commander:\n            self._seen_s = min(",
+           "        if True:\n            self._seen_s = min(",
+           ("web/test_who_beats.py",)),
 )  # fmt: skip

@@ -228,4 +228,12 @@ DEFECTS = (
     Defect("the output's words are told of a wrong cell", "service/running_rig/control_loop.py",
            "said=output.said if output_fault or not cell.fault else cell.said", "said=output.said or cell.said",
            ("service/running_rig/test_loop_and_lines.py",)),
+    Defect("a cell's silence is judged by no standstill of ours", "service/running_rig/control_loop.py",
+           "cell_held=self._processor_held(self.sample.time_s if self.sample else None, now_s)",
+           "cell_held=self._processor_held(None, now_s)",
+           ("service/running_rig/test_loop_and_lines.py",)),
+    Defect("masters may command voltages below the rig's least", "service/running_rig/bank_rules.py",
+           "voltage_min_v=limits.voltage_min_v,",
+           "voltage_min_v=0.0,",
+           ("service/test_starting.py",)),
 )  # fmt: skip

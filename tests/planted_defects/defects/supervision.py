@@ -183,4 +183,12 @@ DEFECTS = (
            "        fails_n = max(NOISE_FAILS * known.noise_n, _TOLERANCE_FAILS * tolerance_n)",
            "        fails_n = NOISE_FAILS * known.noise_n",
            ("control/self_test/test_verdicts.py",)),
+    Defect("who presses when the service is stopped is no lost one behind its restart", "service/running_rig/running_rig.py",
+           "        self.bank.held_enables.note_lost(self.bank.owner, self.bank.command.heartbeat)\n",
+           "",
+           ("end_to_end/kills/test_hung_master_behind_a_restart.py",)),
+    Defect("a clean end leaves the next start no heartbeat of who presses", "service/running_rig/running_rig.py",
+           "self._shutdown_marker.clear(left_of(self._guardian.kept))",
+           "self._shutdown_marker.clear({})",
+           ("end_to_end/kills/test_hung_master_behind_a_restart.py",)),
 )  # fmt: skip

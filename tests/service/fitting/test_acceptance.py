@@ -90,10 +90,12 @@ def test_what_is_out_of_band_or_worse_than_what_is_in_use_is_kept_and_not_offere
     assert store_of(tmp_path).find_selected().document == rejected
 
 
-@pytest.mark.parametrize(("in_use_n", "most_n"), [(1.0, 1.1), (0.1, 0.15)])
-def test_worse_is_by_more_than_a_tenth_and_by_more_than_a_twentieth_of_the_band(in_use_n: float, most_n: float) -> None:
+@pytest.mark.parametrize(("in_use_n", "band_n", "most_n"), [(1.0, 1.0, 1.1), (0.1, 1.0, 0.15), (0.1, 4.0, 0.3)])
+def test_worse_is_by_more_than_a_tenth_and_by_more_than_a_twentieth_of_the_band(
+    in_use_n: float, band_n: float, most_n: float
+) -> None:
     for rms_n, is_worse in ((most_n - 0.001, False), (most_n + 0.001, True)):
-        assert bool(_worse(Error(rms_n, rms_n, 50), Error(in_use_n, in_use_n, 50), 7, 1.0)) is is_worse
+        assert bool(_worse(Error(rms_n, rms_n, 50), Error(in_use_n, in_use_n, 50), 7, band_n)) is is_worse
 
 
 def test_the_band_is_one_of_the_rms_and_not_of_the_worst_point() -> None:

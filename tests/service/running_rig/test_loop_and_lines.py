@@ -8,6 +8,7 @@ import pytest
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
 from gateway.codes.warning_bits import WarningBit
+from gateway.control.blame_for_silence import Held
 from gateway.control.inputs import Output
 from gateway.devices import ValveHost
 from gateway.devices.messages import ForceSample, RepeatedSample
@@ -53,6 +54,20 @@ def test_nothing_counts_as_sent_to_a_port_that_is_away() -> None:
     wired.replug()
     wired.run(0.2)
     assert wired.exchange.line.sent_v == 0.0
+
+
+def test_the_silence_of_each_line_is_judged_by_what_held_us_since_that_line_was_heard() -> None:
+    """Else a wire is blamed for a machine that stood still."""
+    wired = Wired().pressing(12.0)
+    loop, now_s = wired.loop, wired.now_s + 1.0
+    held = SimpleNamespace(
+        since=lambda then_s, until_s, _waited_s: Held(loop_late_s=until_s - then_s), withheld=lambda: (0.0, "")
+    )
+    loop._lateness, loop.output.unanswered_since_s = held, now_s - 0.25  # type: ignore[assignment]
+    assert loop.sample and loop.sample.time_s < now_s - 0.9
+    line = loop._line(now_s)
+    assert line.cell_held.loop_late_s == now_s - loop.sample.time_s
+    assert line.output_held.loop_late_s == pytest.approx(0.25)
 
 
 def test_where_each_sample_decides_no_tick_decides_beside_it() -> None:
