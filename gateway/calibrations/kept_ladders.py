@@ -1,5 +1,6 @@
 """The recordings that a retention leaves alone: the ladders of the calibrations that are in use, come back with a rollback, or
-stand in a slot. `fit`, `calibration compare` and who asks where a curve comes from read them again.
+stand in a slot: `fit`, `calibration compare` and who asks where a curve comes from read them again; and the last ladder of all,
+which `calibrate --resume` goes on with.
 
 Those of all other calibrations go in their turn, for a robot may make one each day, and the disk has an end.
 """
@@ -14,21 +15,30 @@ from gateway.numbered_documents.selection import read_selection
 from gateway.numbered_documents.store import file_name
 from gateway.processes.durable_file import read_regular
 from gateway.processes.state_directory import CALIBRATIONS, RECORDINGS
-from gateway.recording import RecordingError, read_header
+from gateway.recording import RecordingError, read_header, recording_paths
 from gateway.recording.layout import SUFFIX, number_in
 
+_LOOKED_AT: Final = 200  # of the last recordings: whoever goes on with a ladder does so before there are so many others
 _SOURCE: Final = re.compile(r'^source: "recording ([^/"\\:]+):', re.MULTILINE)
 
 
 def kept_ladders(state: Path) -> frozenset[str]:
     """Return the files' names in STATE/recordings; no calibration is checked for it, and one that cannot be read keeps none."""
     folder = state / CALIBRATIONS
-    names: set[str] = set()
+    names = set(_last_ladder(state))
     with contextlib.suppress(OSError):
         selected, _ = read_selection(folder, "calibration")
         for number in selected.numbers:
             names |= set(_parts(state / RECORDINGS, _source_of(folder / file_name(number))))
     return frozenset(names)
+
+
+def _last_ladder(state: Path) -> Iterator[str]:
+    for path in recording_paths(state)[: -_LOOKED_AT - 1 : -1]:
+        with contextlib.suppress(OSError, RecordingError):
+            if read_header(path).get("ladder"):
+                yield from _parts(path.parent, path.name)
+                return
 
 
 def _source_of(calibration: Path) -> str:

@@ -11,8 +11,8 @@ from gateway.profiles.http_sections import HttpSections, http_sections_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Retention:
-    """What is retained; kept recordings, the reference, the one being recorded and the ladders of the calibrations in use
-    always are."""
+    """What is retained; kept recordings, the reference, the one being recorded, the ladders of the calibrations in use and the
+    last ladder always are."""
 
     __pydantic_config__ = STRICT
     days: Annotated[float, Gt(0), Le(36500)] | None = None  # older ones are deleted, the oldest first; null: never

@@ -46,6 +46,18 @@ def test_the_parts_that_a_resumed_run_went_on_from_stay_with_it(tmp_path: Path) 
     assert kept_ladders(tmp_path) == {"0001.fgr", "0002.fgr", "0004.fgr"}
 
 
+def test_the_last_ladder_stays_which_a_resumed_run_would_go_on_with(tmp_path: Path) -> None:
+    """It was said to be kept, and had gone when somebody went on."""
+    for header in (
+        {"ladder": {"groups": 2}},
+        {"ladder": {"groups": 3}},
+        {"ladder": {"groups": 3}, "continues": [2]},
+        {},
+    ):
+        record(tmp_path, **header)
+    assert kept_ladders(tmp_path) == {"0002.fgr", "0003.fgr"}
+
+
 @pytest.mark.parametrize(
     "source",
     ["", "an upload", "recording ladder.csv: 60 stairs", "recording ../0001.fgr: 60 stairs", 'recording "x": y'],

@@ -57,6 +57,8 @@ DEFECTS = (
     Defect("of a resumed ladder the last part alone is kept", "calibrations/kept_ladders.py",
            "read_header(path).get(\"continues\", ()):", "read_header(path).get(\"continues\", ())[-1:]:",
            ("calibrations/test_kept_ladders.py",)),
+    Defect("a ladder that was stopped is pruned before anybody goes on", "calibrations/kept_ladders.py",
+           "    names = set(_last_ladder(state))\n", "    names = set[str]()\n", ("calibrations/test_kept_ladders.py",)),
     Defect("a dry run commits", "calibrations/upload.py",
            "            if action is CommitAction.DRY_RUN:\n                self._end",
            "            if False:\n                self._end", ("calibrations/test_upload_commit.py",)),
@@ -189,4 +191,8 @@ DEFECTS = (
            "        return max(rising[0], falling[0]), min(rising[-1], falling[-1])\n\n    def model",
            "        return rising[0], rising[-1]\n\n    def model",
            ("registers/bank/test_staging.py",)),
+    Defect("a fit may be worse by a twentieth of a newton, whatever the band", "service/fitting/acceptance.py",
+           "other.rms_n + WORSE_SHARE * tolerance_n)",
+           "other.rms_n + WORSE_SHARE)",
+           ("service/fitting/test_acceptance.py",)),
 )  # fmt: skip
