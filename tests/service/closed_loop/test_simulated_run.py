@@ -13,7 +13,7 @@ from gateway.defaults import TICK_S
 from gateway.registers.command import Command
 from gateway.registers.words import ControlBit, State
 from gateway.service.closed_loop import simulated_run
-from gateway.service.closed_loop.schedule import SETTLED_S, SetpointSegment
+from gateway.service.closed_loop.schedule import LARGEST_N, SETTLED_S, SetpointSegment, draw_schedule
 from gateway.service.closed_loop.simulated_run import ControlSetup, SimulatedLoop, simulate_run
 from gateway.twin.surroundings import Surroundings
 from tests.service.rigs import demo, with_supervision
@@ -129,3 +129,11 @@ def test_a_rig_with_a_lease_or_a_valve_presses_as_one_without(settings: ControlS
         for one in (settings, rig.control)
     )
     assert run.fault == "" and run.rms_n == plain.rms_n < 0.5
+
+
+@pytest.mark.parametrize(("force_max_n", "largest_n"), [(20.0, 20.0), (60.0, LARGEST_N)])
+def test_a_small_rig_is_asked_for_no_more_than_it_allows(force_max_n: float, largest_n: float) -> None:
+    plant = demo().plant
+    assert plant
+    wishes = draw_schedule(plant, plant, 0, force_max_n).wishes
+    assert max(end_n for wish in wishes for end_n in (wish.from_n, wish.to_n)) == pytest.approx(largest_n)

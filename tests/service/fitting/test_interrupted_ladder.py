@@ -23,7 +23,7 @@ from gateway.profiles import load_rig
 from gateway.recording import Recorder, Recording, RecordingError, read_recording
 from gateway.registers.words import CalibrationPhase
 from gateway.service.fitting.fit_process import fit_and_store
-from gateway.service.fitting.ladder_source import RigContext, check_source
+from gateway.service.fitting.ladder_source import RigContext, check_source, read_resumed
 from gateway.service.running_rig import calibration_runs
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from tests.service.running_rig.runs.test_calibration_runs import kept
@@ -213,6 +213,15 @@ def test_a_tare_that_a_restart_has_lost_moves_no_group(runs, tmp_path: Path) -> 
     checked, whole = check_source(read_recording(last), DEMO), check_source(tared, DEMO)
     assert np.abs(checked.ladder.force_n - whole.ladder.force_n).max() < 0.6
     assert any("another zero" in note for note in checked.notes)
+
+
+def test_a_part_that_tells_no_zero_stays_as_it_is(tmp_path: Path) -> None:
+    for header in ({"zero_n": 1.7}, {"continues": [1]}):
+        recorder = Recorder(tmp_path, header, ("time_s", "force_n"))
+        recorder.append((0.0, 5.0))
+        recorder.close()
+    forces_n = [part.columns["force_n"].tolist() for part in read_resumed(read_recording(recorder.path))]
+    assert forces_n == [[5.0], [5.0]]
 
 
 def test_only_the_last_stair_left_makes_a_run_whole(runs) -> None:
