@@ -35,8 +35,8 @@ class LeaseJudge:
         self._renewed_s = -inf
         self._brought: dict[Frame, float] = {}
         """Of each master's frames the last heartbeat."""
-        self._first_s: dict[Frame, float] = {}
-        """When each of them came first."""
+        self._since_s: dict[Frame, float] = {}
+        """Since when each of them brings that."""
         self._shown: dict[Frame, float] = {}
         """The same, of those that were refused, too."""
         self._took: set[str] = set()
@@ -70,7 +70,8 @@ class LeaseJudge:
             self._is_enabled = is_answered and control > 0 and bool(control & ENABLE)
             self.holder = host if self._is_enabled or (is_answered and control == BITS) else ""
         if beat is not None:
-            self._first_s.setdefault(frame, now_s)
+            if beat != self._brought.get(frame):
+                self._since_s[frame] = now_s
             self._beat = self._brought[frame] = beat if is_answered and not isnan(beat) else nan
 
     def note_start(self, pdu: bytes, now_s: float, *, is_taken: bool, host: str) -> None:
@@ -122,19 +123,19 @@ class LeaseJudge:
             self._observer.write_s = max(self._observer.write_s, refused_s)
 
     def forget(self, died_s: float, *, is_all: bool = False) -> None:
-        """Another process does not know what was refused once, nor what each frame brought, but for those of the holder that
-        had come before the last tick, which tells of them; is_all: not of those either, for the guardian is another one."""
+        """Another process does not know what was refused once, nor what each frame brought, but for what those of the holder
+        had brought before the last tick, which tells of it; is_all: not of those either, for the guardian is another one."""
         told_s = died_s - 2.0 * self._observer.bounds.period_s
         left = {
             frame: beat
             for frame, beat in self._brought.items()
-            if frame[0] == self.holder and self._first_s[frame] < told_s
+            if frame[0] == self.holder and self._since_s[frame] < told_s
         }
         self._left = {} if is_all else left or self._left
         self._is_ending, self._turned_away = False, ("", -inf)
         self._refused.clear()
         self._brought.clear()
-        self._first_s.clear()
+        self._since_s.clear()
         self._shown.clear()
 
     def renew(self, now_s: float) -> None:

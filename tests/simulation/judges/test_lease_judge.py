@@ -104,6 +104,18 @@ def test_who_begins_by_a_frame_of_before_a_death_is_seen(
     assert bool(observer.broken) is (is_seen and not is_all and died_s == 1.2)
 
 
+def test_what_a_frame_has_brought_just_before_a_death_nobody_has_told_the_next_process() -> None:
+    """As seed 277393 drew it: its second frame had brought another heartbeat 40 ms before, with the next tick to come."""
+    observer = Observer(replace(BOUNDS, lease_s=0.2))
+    judge = LeaseJudge(observer)
+    for pdu, at_s in ((write_one_pdu(4, 2), 0.5), (FRAME, 1.0), (write_one_pdu(4, 43536), 1.16)):
+        judge.note_write(pdu, at_s, is_answered=True, host="10.0.0.1")
+    judge.forget(1.2)
+    for pdu in (write_one_pdu(4, 43536), FRAME):
+        judge.note_start(pdu, 1.5, is_taken=True, host="10.0.0.1")
+    assert observer.broken == []
+
+
 @pytest.mark.parametrize(("refused_s", "host", "is_seen"), [(1.14, "10.0.0.1", False), (1.14, "10.0.0.2", True)])
 def test_who_is_refused_just_before_the_gateway_is_told_to_stop_is_there(
     refused_s: float, host: str, is_seen: bool
