@@ -7,9 +7,9 @@ Those of all other calibrations go in their turn, for a robot may make one each 
 
 import contextlib
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from gateway.numbered_documents.selection import read_selection
 from gateway.numbered_documents.store import file_name
@@ -25,7 +25,9 @@ _SOURCE: Final = re.compile(r'^source: "recording ([^/"\\:]+):', re.MULTILINE)
 def kept_ladders(state: Path) -> frozenset[str]:
     """Return the files' names in STATE/recordings; no calibration is checked for it, and one that cannot be read keeps none."""
     folder = state / CALIBRATIONS
-    names = set(_last_ladder(state))
+    names: set[str] = set()
+    if last := find_last_ladder(recording_paths(state)[-_LOOKED_AT:]):
+        names |= set(_parts(state / RECORDINGS, last[0].name))
     with contextlib.suppress(OSError):
         selected, _ = read_selection(folder, "calibration")
         for number in selected.numbers:
@@ -33,12 +35,14 @@ def kept_ladders(state: Path) -> frozenset[str]:
     return frozenset(names)
 
 
-def _last_ladder(state: Path) -> Iterator[str]:
-    for path in recording_paths(state)[: -_LOOKED_AT - 1 : -1]:
+def find_last_ladder(paths: Sequence[Path]) -> tuple[Path, dict[str, Any]] | None:
+    """Return the last of these recordings that is a ladder, and its header; None where none is. Of the others, which may have
+    gigabytes, only the headers are read."""
+    for path in reversed(paths):
         with contextlib.suppress(OSError, RecordingError):
-            if read_header(path).get("ladder"):
-                yield from _parts(path.parent, path.name)
-                return
+            if (header := read_header(path)).get("ladder"):
+                return path, header
+    return None
 
 
 def _source_of(calibration: Path) -> str:

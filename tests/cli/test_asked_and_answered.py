@@ -213,8 +213,7 @@ def test_what_is_gone_of_a_ladder_is_climbed_again_and_no_zero_is_taken_under_fo
 ) -> None:
     """The slide has pressed since: what rests on it now is friction's, and the zero is that of the first part."""
     last = recorded(2, 1, continues=[1])
-    monkeypatch.setattr(resume, "recording_paths", lambda state: [Path("0001.fgr"), last.path])
-    monkeypatch.setattr(resume, "read_header", lambda path: last.header)
+    monkeypatch.setattr(resume, "find_last_ladder", lambda paths: (last.path, last.header))
     monkeypatch.setattr(resume, "read_recording", lambda path: last)
     monkeypatch.setattr(resume, "_whole_groups", lambda recording: recording.climbed if recording else 0)
     monkeypatch.setattr(resume, "_is_finished", lambda recording: True)

@@ -5,7 +5,6 @@ cycle, as every recording begins. A recording that may not be fitted counts for 
 gigabytes, only the headers are read.
 """
 
-import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +12,7 @@ from typing import Any, Final
 from gateway.bsfm.ladder.check import check_ladder
 from gateway.bsfm.ladder.labels import Labels
 from gateway.bsfm.ladder.ladder_error import LadderError
+from gateway.calibrations.kept_ladders import find_last_ladder
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
@@ -74,10 +74,8 @@ def _plan_of(facts: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def _last_ladder(state: Path) -> tuple[Path, dict[str, Any]]:
-    for path in reversed(recording_paths(state)):
-        with contextlib.suppress(RecordingError, OSError):
-            if (header := read_header(path)).get("ladder"):
-                return path, header
+    if last := find_last_ladder(recording_paths(state)):
+        return last
     sentence = f"no calibration run is recorded in {state / RECORDINGS}: nothing to go on with"
     raise CliError(f"E422 {sentence}", exit_codes.DATA)
 

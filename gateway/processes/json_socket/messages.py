@@ -24,10 +24,9 @@ _DIGITS_AS_ZEROS: Final = bytes.maketrans(b"123456789", b"000000000")
 
 def why_path_too_long(path: Path) -> str:
     """Return why no socket can be at this path, with the cure; empty where one can."""
-    length = len(os.fsencode(path))
-    return f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR" * (
-        length > _LONGEST_PATH
-    )
+    if (length := len(os.fsencode(path))) <= _LONGEST_PATH:
+        return ""
+    return f"{length} bytes of path, a socket takes {_LONGEST_PATH}: give a shorter --state DIR"
 
 
 def error_answer(sentence: str) -> Answer:

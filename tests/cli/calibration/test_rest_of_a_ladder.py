@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.bsfm.ladder.ladder_error import LadderError, LadderFlaw
+from gateway.calibrations import kept_ladders
 from gateway.cli.calibration import resume, store_access
 from gateway.cli.calibration.resume import RestOfLadder, find_rest_of_ladder
 from gateway.cli.errors import CliError
@@ -79,7 +80,7 @@ class Recorded:
         none, older = {"rig": "demo"}, {"ladder": PLAN}
         self.headers: dict[Path, Any] = {Path(f"000{k}.fgr"): one for k, one in ((0, older), (3, header), (4, none))}
         monkeypatch.setattr(resume, "recording_paths", lambda state: list(self.headers))
-        monkeypatch.setattr(resume, "read_header", lambda path: self.headers[path])
+        monkeypatch.setattr(kept_ladders, "read_header", lambda path: self.headers[path])
         monkeypatch.setattr(resume, "read_recording", self._read)
         monkeypatch.setattr(resume, "check_ladder", self._check)
         monkeypatch.setattr(resume, "_is_finished", lambda recording: finished)

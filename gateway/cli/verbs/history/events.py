@@ -64,11 +64,11 @@ def _events_of(reader: EventReader, after: str, follow: bool) -> Iterator[EventR
     """Yield what is younger; what comes while we look is so, whatever the clock says meanwhile."""
     younger = YoungerRecords(after)
     yield from (event for event in reader.read_stored() if younger.includes(event.time))
-    while follow and not _left_alone(_POLL_S):
+    while follow and not _reader_goes_within(_POLL_S):
         yield from reader.read_new()
 
 
-def _left_alone(within_s: float) -> bool:
+def _reader_goes_within(within_s: float) -> bool:
     """Wait, and return whether meanwhile or before whoever read our stdout has gone: behind `| grep -m1 A310` no further event
     may be wanted for days, and only a write would tell."""
     try:

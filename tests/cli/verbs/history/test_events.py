@@ -128,7 +128,7 @@ def test_following_ends_with_who_reads_it(state: Path, monkeypatch) -> None:
     with os.fdopen(write_end, "w") as out, EventReader(state) as reader:
         monkeypatch.setattr(verb.sys, "stdout", out)
         monkeypatch.setattr(verb.time, "sleep", lambda seconds: pytest.fail("it waited"))
-        assert not verb._left_alone(0.0), "it is read"
+        assert not verb._reader_goes_within(0.0), "it is read"
         os.close(read_end)
         assert len(list(verb._events_of(reader, "", follow=True))) == len(SAID)
 
