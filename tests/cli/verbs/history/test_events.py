@@ -3,6 +3,7 @@
 import json
 import os
 import threading
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -130,7 +131,10 @@ def test_following_ends_with_who_reads_it(state: Path, monkeypatch) -> None:
         monkeypatch.setattr(verb.time, "sleep", lambda seconds: pytest.fail("it waited"))
         assert not verb._reader_goes_within(0.0), "it is read"
         os.close(read_end)
-        assert len(list(verb._events_of(reader, "", follow=True))) == len(SAID)
+        shown = verb._events_of(reader, "", follow=True)
+        assert len(list(islice(shown, len(SAID)))) == len(SAID)
+        monkeypatch.setattr(reader, "read_new", lambda: pytest.fail("it reads on, for nobody"))
+        assert not list(shown)
 
 
 @pytest.mark.parametrize("since", ["10m", "2026-11-22T11:50"])
