@@ -23,6 +23,7 @@ _REASONS: Final = {
     errno.EROFS: "mounted so, or by the kernel after errors (dmesg)",
     errno.EIO: "the disk is broken, or gone (dmesg)",
 }
+_NOTHING: Final = frozenset((errno.ENOENT, errno.ENOTDIR, errno.ELOOP))
 _WITH_PLACE: Final = frozenset((errno.EINVAL, errno.EISDIR))
 _KINDS: Final = {
     stat.S_IFDIR: DIRECTORY,
@@ -40,6 +41,34 @@ def expand_home(name: Path | str) -> Path:
     with suppress(RuntimeError):
         return path.expanduser()
     return path
+
+
+def exists(path: Path | str) -> bool:
+    """Return whether anything has this name. OSError where that cannot be known, as from a broken disk or a folder of somebody
+    else's: pathlib's own answer is no, from Python 3.14 on, and a run that may press still would have ended."""
+    return bool(_mode_of(path))
+
+
+def is_directory(path: Path | str) -> bool:
+    """Return whether this is a directory. OSError where that cannot be known."""
+    return stat.S_ISDIR(_mode_of(path))
+
+
+def is_file(path: Path | str) -> bool:
+    """Return whether this is a plain file. OSError where that cannot be known."""
+    return stat.S_ISREG(_mode_of(path))
+
+
+def _mode_of(path: Path | str) -> int:
+    """What has this name, links followed: 0 for nothing."""
+    try:
+        return os.stat(path).st_mode  # noqa: PTH116
+    except ValueError:  # no name at all: a zero byte is in it
+        return 0
+    except OSError as error:
+        if error.errno in _NOTHING:
+            return 0
+        raise
 
 
 def other_kind(path: Path | str) -> str:
@@ -96,7 +125,7 @@ def replaced_by(path: Path) -> Path:
     than a plain file stands: root would make a device such as /dev/null a file, for everybody; and where there is no folder,
     or one that takes no file, which would else be told by the name of the file beside it, that nobody has given."""
     place = Path(os.path.realpath(path))
-    if not place.parent.is_dir():
+    if not is_directory(place.parent):
         raise FileNotFoundError(errno.ENOENT, "no such directory", str(path.parent))
     if not os.access(place.parent, os.W_OK | os.X_OK):
         number = errno.EROFS if os.statvfs(place.parent).f_flag & os.ST_RDONLY else errno.EACCES

@@ -20,6 +20,9 @@ from tests.gate.tried_again import TriedAgain
 from tests.gate.workers import ForkedWorkers
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: the diagnosis' matrices are small
+os.environ.setdefault(
+    "JE_ARROW_MALLOC_CONF", "background_thread:false"
+)  # before pyarrow: workers and children are forked
 
 
 def pytest_configure(config: pytest.Config) -> None:

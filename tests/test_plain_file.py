@@ -7,7 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from gateway.plain_file import check_plain, open_plain, open_plain_stream, other_kind, read_plain
+from gateway.plain_file import (
+    check_plain,
+    exists,
+    is_directory,
+    is_file,
+    open_plain,
+    open_plain_stream,
+    other_kind,
+    read_plain,
+)
 from tests.other_kinds import MAKERS, never_waiting, put
 
 DOORS: dict[str, Callable[[Path], object]] = {
@@ -69,3 +78,20 @@ def test_a_name_in_an_open_folder_is_opened_there(tmp_path: Path) -> None:
     assert os.read(descriptor, 9) == b"whole"
     os.close(descriptor)
     os.close(folder)
+
+
+def test_what_has_a_name_is_told_by_its_kind_and_nothing_is_there_for_a_name_of_none(tmp_path: Path) -> None:
+    file, round_about = tmp_path / "rig.yaml", tmp_path / "round"
+    file.touch()
+    round_about.symlink_to(round_about)
+    asked = {tmp_path: (True, True, False), file: (True, False, True)}
+    nothing = (tmp_path / "gone", file / "below", round_about, Path("a\0b"))
+    asked |= dict.fromkeys(nothing, (False, False, False))
+    assert {path: (exists(path), is_directory(path), is_file(path)) for path in asked} == asked
+
+
+@pytest.mark.parametrize("ask", [exists, is_directory, is_file])
+def test_where_a_disk_does_not_say_nobody_says_no(ask: Callable[[Path], bool], tmp_path: Path) -> None:
+    """pathlib does, from Python 3.14 on: a run that may press still would be taken for one that has ended."""
+    with pytest.raises(OSError, match="too long"):
+        ask(tmp_path / ("x" * 300))

@@ -24,7 +24,7 @@ from typing import Any, Final, NamedTuple
 from gateway.audit.chain import NO_HASH, BrokenLine, ChainEnd, open_line, seal_line
 from gateway.audit.file_lines import count_lines, read_end, read_line
 from gateway.audit.unsynced_lines import cut_unsynced
-from gateway.plain_file import open_plain, open_plain_stream, other_kind
+from gateway.plain_file import exists, is_directory, open_plain, open_plain_stream, other_kind
 from gateway.processes.durable_file import make_directory, read_object, sync_path
 from gateway.processes.state_directory import AUDIT
 
@@ -159,7 +159,7 @@ class AuditFile:
     def _go_on_elsewhere(self) -> None:
         """Begin another file behind the last line; what comes first in it tells of the one that is gone. OSError where the
         folder cannot be made again, as where the whole state directory was moved away."""
-        if not self._folder.parent.is_dir():
+        if not is_directory(self._folder.parent):
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self._folder.parent))
         make_directory(self._folder)
         gone = f"{self._path.name} was removed or replaced while it was written"
@@ -291,7 +291,7 @@ class AuditFile:
         return self._folder / f"{end.number + 1:012d}.jsonl"
 
     def _open(self, path: Path, end: ChainEnd) -> None:
-        is_new = not path.exists()
+        is_new = not exists(path)
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT
         descriptor = open_plain(path, flags, 0o600)
         try:

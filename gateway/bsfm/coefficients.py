@@ -148,8 +148,11 @@ class Allowed:
             yield swapped
         elif not tiny or not self.low <= number <= self.high:
             reason = self.reason if isfinite(number) else CoefficientReason.NOT_FINITE
-            allowed = f"{self.low:g} .. {self.high:g} {self.unit}".rstrip()
-            yield CoefficientFault(index, reason, f"{self.name} = {number:g}: {allowed} is allowed")
+            yield CoefficientFault(index, reason, self._refused(number))
+
+    def _refused(self, number: float) -> str:
+        allowed = f"{self.low:g} .. {self.high:g} {self.unit}".rstrip()
+        return f"{self.name} = {number:g}: {allowed} is allowed"
 
     def swap_fault(self, number: float) -> CoefficientFault | None:
         """Return the fault of a number of the whole set that makes sense with its words swapped alone, None for none. A range
@@ -161,7 +164,12 @@ class Allowed:
         swapped = _swap_words(number)
         if not (self.low <= swapped <= self.high and abs(swapped) > _MEANT):
             return None
-        text = f"{self.name} = {number:g}; with its words swapped {swapped:g}: the sender uses the other word order"
+        if self.low <= number <= self.high:
+            text = f"{self.name} = {number:g}; with its words swapped {swapped:g}: the sender uses the other word order"
+        else:  # one number in ten that nobody has sent, as a fit's, is so by chance
+            text = (
+                f"{self._refused(number)}; with its words swapped {swapped:g}, as from a sender of the other word order"
+            )
         return CoefficientFault(index, CoefficientReason.WORDS_SWAPPED, text)
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 from gateway import defaults
 from gateway.cli.control_socket import ask
 from gateway.cli.errors import CliError, NoAnswerError, disk_hangs
+from gateway.plain_file import is_directory
 from gateway.processes import exit_codes
 from gateway.processes.state_lock import hold_state_lock
 
@@ -52,7 +53,7 @@ def _own_end(ends: dict[str, dict[str, Any]] | None, job: str) -> dict[str, Any]
 @contextmanager
 def not_running(directory: Path) -> Iterator[bool]:
     """Yield whether no gateway runs on this directory; while True none can start."""
-    if not directory.is_dir():
+    if not is_directory(directory):
         yield True
         return
     with hold_state_lock(directory) as is_ours:

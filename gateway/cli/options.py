@@ -11,6 +11,7 @@ import click
 from gateway import defaults
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Whole
+from gateway.plain_file import exists
 
 if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
@@ -220,7 +221,7 @@ class StateChoice:
 
 def check_state(state: Path | None) -> None:
     """Check that the directory of --state is there: E106 where it is not."""
-    if state is not None and not state.exists():
+    if state is not None and not exists(state):
         from gateway.cli.errors import no_state_directory
 
         raise no_state_directory(state)

@@ -21,7 +21,7 @@ from typing import Final
 
 from gateway import VERSION
 from gateway.audit.audit_file import HEAD
-from gateway.plain_file import check_plain, open_plain_stream
+from gateway.plain_file import check_plain, exists, is_directory, is_file, open_plain_stream
 from gateway.processes import state_lock
 from gateway.processes.durable_file import lock_directory, make_path, replacing_file, sync_path
 from gateway.processes.state_directory import CONTROL_SOCKET, RUNNING, place_before_restore, place_of_restore
@@ -56,7 +56,7 @@ def pack_state(state: Path, target: Path) -> list[str]:
             with contextlib.suppress(FileNotFoundError):  # an event file that has got its next name meanwhile
                 _add(archive, path, f"{_TOP}/{path.relative_to(state)}")
                 files.append(path)
-    return [str(path.relative_to(state)) for path in files if not path.is_dir()]
+    return [str(path.relative_to(state)) for path in files if not is_directory(path)]
 
 
 def links_in(state: Path) -> list[str]:
@@ -87,7 +87,7 @@ def unpack_state(source: Path, state: Path) -> Path | None:
         fresh = beside / _TOP
         fresh.mkdir(exist_ok=True)
         fresh.chmod(0o700)
-        _give_to_owner(fresh, state if state.exists() else state.parent)
+        _give_to_owner(fresh, state if exists(state) else state.parent)
         _sync_all(fresh)
         return _put_in_place(fresh, state)
 
@@ -179,13 +179,13 @@ def _files(state: Path) -> Iterator[Path]:
     """Directories and plain files, parents first; links and sockets stay behind. The audit's head goes before anybody looks
     which files of lines there are: those that come meanwhile are beyond it, else it would name some that are not there. OSError
     for a directory that may not be read: a backup without it would be taken for a whole one."""
-    if (head := state / HEAD).is_file() and not head.is_symlink():
+    if is_file(head := state / HEAD) and not head.is_symlink():
         yield head
     for path in sorted(state.iterdir()):
-        if path == head or path.is_symlink() or not (path.is_dir() or path.is_file()):
+        if path == head or path.is_symlink() or not (is_directory(path) or is_file(path)):
             continue
         yield path
-        if path.is_dir():
+        if is_directory(path):
             with contextlib.suppress(FileNotFoundError):  # removed meanwhile
                 yield from _files(path)
 
@@ -197,7 +197,7 @@ def _is_kept(path: Path, state: Path) -> bool:
 
 def _add(archive: tarfile.TarFile, path: Path, name: str) -> None:
     """Add one. A file is opened before it is measured: one that is replaced in between would be cut, or end the backup."""
-    if path.is_dir():
+    if is_directory(path):
         archive.add(path, name, recursive=False)
         return
     with open_plain_stream(path) as stream:
@@ -247,9 +247,9 @@ def _is_left_out(parent: str, name: str) -> bool:
 
 def _set_aside(state: Path) -> Path | None:
     """Rename what is there; an empty directory stays, for another one may take its name."""
-    if not state.exists() or not any(state.iterdir()):
+    if not exists(state) or not any(state.iterdir()):
         return None
     number = 1
-    while (previous := place_before_restore(state, number)).exists():
+    while exists(previous := place_before_restore(state, number)):
         number += 1
     return state.rename(previous)

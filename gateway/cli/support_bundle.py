@@ -24,7 +24,7 @@ from typing import Any, Final
 from gateway import VERSION
 from gateway.cli.errors import CliError
 from gateway.defaults import HOST
-from gateway.plain_file import tell_place_and_refusal
+from gateway.plain_file import is_file, tell_place_and_refusal
 from gateway.processes.durable_file import replacing_file
 
 EVENT_LINES: Final = 2000
@@ -176,7 +176,7 @@ def _ask(state: Path, what: str) -> dict[str, Any]:
 def _listing(state: Path) -> str:
     lines = []
     next(state.iterdir(), None)  # OSError where this user may not look: rglob finds nothing there, and says nothing
-    for path in sorted(path for path in state.rglob("*") if path.is_file() and not path.is_symlink()):
+    for path in sorted(path for path in state.rglob("*") if is_file(path) and not path.is_symlink()):
         with contextlib.suppress(FileNotFoundError):  # a running gateway removes some
             lines.append(f"{path.stat().st_size:>12} {path.relative_to(state)}")
     return "\n".join(lines)

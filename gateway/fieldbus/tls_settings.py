@@ -45,6 +45,8 @@ HANDSHAKES_PER_S: Final = 20.0
 LONGEST_NAME: Final = 64
 """Characters of a client's common name (RFC 5280, ub-common-name), which stands in lines of log and audit."""
 CURVE: Final = "prime256v1"
+_NO_COMPRESSED_CERTIFICATE: Final = 1 << 33
+"""SSL_OP_NO_RX_CERTIFICATE_COMPRESSION of OpenSSL from 3.2 on, nothing before: a chain without end would come in few bytes."""
 _NO_WAY: Final = (NO_ISSUER, 20, 21)
 """And X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT_LOCALLY, X509_V_ERR_UNABLE_TO_VERIFY_LEAF_SIGNATURE."""
 _STRANGER: Final = (7, 18, 19)
@@ -82,7 +84,7 @@ def _make_context(certificate: bytes, key: bytes, ca: bytes) -> ssl.SSLContext:
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.verify_mode = ssl.CERT_REQUIRED
     context.num_tickets = 0
-    context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION
+    context.options |= ssl.OP_NO_RENEGOTIATION | ssl.OP_NO_COMPRESSION | _NO_COMPRESSED_CERTIFICATE
     context.set_ecdh_curve(CURVE)
     with _in_memory(certificate) as own, _in_memory(key) as secret, _in_memory(ca) as trusted:
         context.load_cert_chain(own, secret, password=lambda: b"")  # else OpenSSL asks for it at the terminal

@@ -13,7 +13,7 @@ from hashlib import file_digest
 from pathlib import Path
 from typing import Any, Final
 
-from gateway.plain_file import tell_place_and_refusal
+from gateway.plain_file import exists, is_file, tell_place_and_refusal
 from gateway.recording.errors import RecordingError
 
 Row = dict[str, Any]
@@ -47,7 +47,7 @@ def find_tasks(patterns: Iterable[str]) -> list[Task]:
     as to a store that is not mounted, is one that cannot be read: left out, its day would be missing without a word."""
     # a pattern may be absolute, which Path.glob refuses
     found = {path for pattern in patterns for path in glob.glob(pattern, recursive=True)}  # noqa: PTH207
-    return [_task_of(path) for path in sorted(found) if Path(path).is_file() or not Path(path).exists()]
+    return [_task_of(path) for path in sorted(found) if is_file(path) or not exists(path)]
 
 
 def _task_of(path: str) -> Task:

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.plain_file import is_directory
 from gateway.processes.json_socket.messages import LONGEST_ANSWER
 from gateway.processes.state_directory import CONTROL_SOCKET
 
@@ -84,7 +85,7 @@ class ControlLink:
         try:
             return await asyncio.open_unix_connection(str(self._path), limit=LONGEST_ANSWER)
         except FileNotFoundError:
-            if self._path.parent.is_dir():
+            if is_directory(self._path.parent):
                 raise
             raise RemovedStateError(self._path.parent) from None
 

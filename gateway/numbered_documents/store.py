@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final, Generic, TypeVar
 
 from gateway.numbered_documents.selection import BUILT_IN, Selection, SelectionState, read_selection, write_selection
-from gateway.plain_file import tell_place_and_refusal
+from gateway.plain_file import is_directory, tell_place_and_refusal
 from gateway.processes.durable_file import lock_directory, make_directory, read_regular, write_durably
 from gateway.registers.upload.staging import SLOTS
 
@@ -209,7 +209,7 @@ class NumberedStore(ABC, Generic[Document]):
 
     def numbers(self) -> Numbers:
         """Return the numbers that the store has, in order."""
-        names = [path.name for path in self.directory.iterdir()] if self.directory.is_dir() else []
+        names = [path.name for path in self.directory.iterdir()] if is_directory(self.directory) else []
         return sorted(int(match[1]) for name in names if (match := _NAME.fullmatch(name)))
 
     def _next_number(self) -> int:

@@ -4,6 +4,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from gateway.plain_file import exists
 from gateway.ports.holders import holders_of, list_folder
 from gateway.ports.latency import latency_ms
 
@@ -42,12 +43,12 @@ def present_paths(devices: Path = Path("/dev"), system: Path = Path("/sys")) -> 
 def _by_id(devices: Path) -> dict[str, str]:
     """Device name -> its by-id path."""
     links = list_folder(devices / "serial" / "by-id")
-    return {Path(os.path.realpath(link)).name: str(link) for link in sorted(links) if link.exists()}
+    return {Path(os.path.realpath(link)).name: str(link) for link in sorted(links) if exists(link)}
 
 
 def _is_real(entry: Path) -> bool:
     """Consoles have no device; a PC's four ttyS have one each, of type 0 where there is no chip."""
-    return (entry / "device" / "driver").exists() and _text(entry / "type") != "0"
+    return exists(entry / "device" / "driver") and _text(entry / "type") != "0"
 
 
 def _info(name: str, by_id: str | None, devices: Path, system: Path) -> PortInfo:
@@ -57,7 +58,7 @@ def _info(name: str, by_id: str | None, devices: Path, system: Path) -> PortInfo
         by_id=by_id,
         device=device,
         description=_description(entry),
-        driver=Path(os.path.realpath(entry / "driver")).name if (entry / "driver").exists() else "",
+        driver=Path(os.path.realpath(entry / "driver")).name if exists(entry / "driver") else "",
         latency_ms=latency_ms(device, system),
         holder=", ".join(str(holder) for holder in holders_of(device)),
     )

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Final
 from zlib import crc32
 
-from gateway.plain_file import closing_descriptor, open_plain, open_plain_stream, replaced_by, write_whole
+from gateway.plain_file import closing_descriptor, exists, open_plain, open_plain_stream, replaced_by, write_whole
 
 _FRESH: Final = ".new"
 _BESIDE: Final = ".part"
@@ -85,7 +85,7 @@ def make_directory(directory: Path) -> None:
 def make_path(directory: Path, mode: int = 0o700) -> None:
     """Make the directory and those above it, and have the names of those that were made on the disk: what is stored durably in
     one whose own name is lost is lost with it. OSError where that is refused; some may be there then."""
-    made = [each for each in (directory, *directory.parents) if not each.exists()]
+    made = [each for each in (directory, *directory.parents) if not exists(each)]
     directory.mkdir(parents=True, exist_ok=True, mode=mode)
     for each in made:
         sync_path(each.parent)

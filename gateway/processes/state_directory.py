@@ -8,6 +8,7 @@ from glob import escape
 from pathlib import Path
 from typing import Final
 
+from gateway.plain_file import exists, is_directory
 from gateway.processes.durable_file import lock_directory, sync_path
 
 RECORDINGS: Final = "recordings"
@@ -37,7 +38,7 @@ def left_aside(state: Path) -> Path | None:
     """Return where a restore that was killed between its two renames has left the state; None where it is in its place, or none
     was killed."""
     state = state.resolve()
-    if state.exists() or not place_of_restore(state).is_dir():
+    if exists(state) or not is_directory(place_of_restore(state)):
         return None
     aside = state.parent.glob(place_before_restore(Path(escape(state.name)), "*").name)
     return max(aside, key=lambda path: path.stat().st_ctime_ns, default=None)

@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from gateway.plain_file import closing_descriptor, open_plain
+from gateway.plain_file import closing_descriptor, exists, open_plain
 from gateway.processes.durable_file import give_to_owner
 
 NAME: Final = "lock"
@@ -36,7 +36,7 @@ def _open(path: Path) -> int:
     try:
         return open_plain(path, os.O_WRONLY | os.O_CREAT, 0o644)
     except OSError:
-        if not path.exists():
+        if not exists(path):
             raise
         return open_plain(path)
 

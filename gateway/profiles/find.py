@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 import gateway
-from gateway.plain_file import DIRECTORY, expand_home, other_kind
+from gateway.plain_file import DIRECTORY, expand_home, is_directory, is_file, other_kind
 from gateway.profiles.kinds.file_kind import CALLED, is_foreign, keys_at_the_top, kind_of
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
@@ -27,7 +27,7 @@ def shipped_profiles_folder() -> Path:
     """Return the folder of the shipped profiles: gateway/_profiles in an installed wheel, else the checkout's profiles/."""
     package = Path(gateway.__file__).parent
     installed = package / "_profiles"
-    return installed if installed.is_dir() else package.parent / "profiles"
+    return installed if is_directory(installed) else package.parent / "profiles"
 
 
 def shipped_file(kind: str, name: str) -> Path:
@@ -82,7 +82,7 @@ def _called(kind: str) -> str:
 
 def _is_file(path: Path) -> bool:
     try:
-        return path.is_file()
+        return is_file(path)
     except (OSError, ValueError):  # a name that is too long, or holds what no file name may
         return False
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from zlib import crc32
 
+from gateway.plain_file import is_file
 from gateway.processes.state_directory import RECORDINGS
 from gateway.recording.errors import RecordingError, tell_unreadable
 from gateway.recording.layout import HEADER_PREFIX, LONGEST_HEADER, MAGIC, MARK, SUFFIX, Batch, batch_at, number_in
@@ -107,13 +108,13 @@ def recording_paths(state_directory: Path) -> list[Path]:
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         paths = [path for path in (state_directory / RECORDINGS).iterdir() if path.suffix == SUFFIX]
     numbered = ((number, path) for path in paths if (number := number_in(path)) is not None)
-    return [path for _, path in sorted(numbered) if path.is_file()]  # a pipe or a device would be read for ever
+    return [path for _, path in sorted(numbered) if is_file(path)]  # a pipe or a device would be read for ever
 
 
 def find_recording(state_directory: Path, number: int) -> Path:
     """Return the file of one number; RecordingError that names the ones there are."""
     path = state_directory / RECORDINGS / f"{number:04d}{SUFFIX}"
-    if path.is_file():
+    if is_file(path):
         return path
     present = ", ".join(str(int(each.stem)) for each in recording_paths(state_directory)) or "none"
     raise RecordingError(f"no recording {number} in {path.parent}; there: {present}")

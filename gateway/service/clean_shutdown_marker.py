@@ -10,7 +10,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from gateway.plain_file import closing_descriptor
+from gateway.plain_file import closing_descriptor, exists
 from gateway.processes.durable_file import read_object, replace_durably, sync_path
 from gateway.processes.state_directory import LEFT, RUNNING
 
@@ -25,7 +25,7 @@ class CleanShutdownMarker:
         """Mark this run as begun, on the disk: the power may go at once. True when the one before never lowered its flag, or
         when that cannot be known."""
         try:
-            was_unclean = self._path.exists()
+            was_unclean = exists(self._path)
         except OSError:
             was_unclean = True
         with contextlib.suppress(OSError):
@@ -49,7 +49,7 @@ class CleanShutdownMarker:
             contextlib.suppress(OSError),
             closing_descriptor(os.open(self._path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)) as directory,
         ):
-            if left and self._path.exists():
+            if left and exists(self._path):
                 replace_durably(directory, LEFT, json.dumps(left).encode(), mode=0o600)
 
     def clear(self, left: dict[str, Any] | None = None) -> None:
@@ -62,7 +62,7 @@ class CleanShutdownMarker:
         ):
             if left:
                 replace_durably(directory, LEFT, json.dumps(left).encode(), mode=0o600)
-            elif self._left.exists():
+            elif exists(self._left):
                 self._left.unlink(missing_ok=True)
                 os.fsync(directory)
             self._path.unlink(missing_ok=True)

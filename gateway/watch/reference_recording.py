@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from gateway.numbered_documents.selection import read_selection
+from gateway.plain_file import is_file
 from gateway.processes.durable_file import (
     lock_directory,
     make_directory,
@@ -59,7 +60,7 @@ def read_reference_recording(state: Path) -> ReferenceRecording | None:
     try:
         reference = ReferenceRecording(**read_object(state / _FOLDER / _FACTS))
         is_whole = isinstance(reference.name, str) and isinstance(reference.kept_utc, str)
-        return reference if is_whole and reference_path(state, reference).is_file() else None
+        return reference if is_whole and is_file(reference_path(state, reference)) else None
     except (OSError, ValueError, TypeError):
         return None
 

@@ -95,6 +95,14 @@ def test_the_text_says_what_a_swapped_weight_was_meant_to_be():
     assert "words swapped 0.93" in faults[0].text
 
 
+def test_what_is_allowed_is_told_beside_what_its_words_may_have_meant():
+    """A fit's handle beyond the cell's range was told as a sender's mistake alone: one in ten makes sense by chance."""
+    limits = replace(LIMITS, cell_range_n=40.0)
+    (fault,) = validate_coefficients(replace(GOOD, falling_handles_n=(0.0, 8.0, bits("423ab770"))), limits)
+    assert fault.reason is CoefficientReason.WORDS_SWAPPED
+    assert "falling handle 2 = 46.6791: -40 .. 40 is allowed; with its words swapped" in fault.text
+
+
 def test_all_numbers_are_named_at_once():
     faults = validate_coefficients(replace(GOOD, rising_handles_n=(math.nan, 200.0, 38.0), x1_v=99.0), LIMITS)
     assert len(faults) == 3

@@ -159,10 +159,9 @@ def step_back() -> None:
 
 
 def own_threads() -> set[str]:
-    """Names of this process's threads beside its first, which a fork does not take along. That of pyarrow's allocator, which it
-    starts again in each process, is none of them."""
+    """Names of this process's threads beside its first, which a fork does not take along."""
     threads = [thread for thread in Path("/proc/self/task").iterdir() if thread.name != str(os.getpid())]
-    return {(thread / "comm").read_text().strip() for thread in threads} - {"jemalloc_bg_thd"}
+    return {(thread / "comm").read_text().strip() for thread in threads}
 
 
 class Worker(NamedTuple):

@@ -3,6 +3,7 @@
 import asyncio
 import errno
 import json
+import os
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from ipaddress import ip_network
@@ -109,11 +110,13 @@ def test_by_what_nothing_begins_alone_is_left_behind_a_clean_end(kept: dict[str,
 def test_a_disk_that_does_not_say_how_the_last_run_ended_counts_as_unclean(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(path: Path) -> bool:
-        raise OSError(5, "Input/output error")
+    def refuse(path: Path) -> os.stat_result:
+        raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr(Path, "exists", refuse)
-    assert CleanShutdownMarker(tmp_path).mark_running()
+    marker = CleanShutdownMarker(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "stat", refuse)
+        assert marker.mark_running()
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gateway.bsfm import Calibration
+from gateway.plain_file import is_file
 from gateway.processes.state_directory import RECORDINGS
 
 if TYPE_CHECKING:
@@ -59,4 +60,4 @@ def _recording_of(calibration: Calibration, state: Path) -> Path | None:
     if not name or Path(name).name != name:
         return None
     candidates = (state / RECORDINGS / name, Path(name))
-    return next((path for path in candidates if path.is_file()), None)
+    return next((path for path in candidates if is_file(path)), None)

@@ -14,6 +14,7 @@ from gateway.bsfm.ladder.labels import Labels
 from gateway.bsfm.ladder.ladder_error import LadderError
 from gateway.calibrations.kept_ladders import find_last_ladder
 from gateway.cli.errors import CliError
+from gateway.plain_file import exists
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
 from gateway.recording import Recording, RecordingError, read_header, read_recording, recording_paths
@@ -83,7 +84,7 @@ def _last_ladder(state: Path) -> tuple[Path, dict[str, Any]]:
 def rig_of(recording: Path, named: str) -> str:
     """Return the rig file that a recording names, if that can (still) be read, else the one that was named."""
     file = str(read_header(recording).get("rig_file", ""))
-    return file if file and Path(file).exists() else named
+    return file if file and exists(file) else named
 
 
 def _beside(path: Path, number: int) -> Recording | None:

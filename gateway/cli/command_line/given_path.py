@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from gateway.plain_file import expand_home
+from gateway.plain_file import exists, expand_home
 
 EMPTY: Final = "an empty name: is a variable of the shell not set?"
 _MAY_BE_EMPTY: Final = ("--name", "--note")  # words for people
@@ -43,7 +43,7 @@ class GivenPath(click.Path):
 def lost_target(path: Path) -> str:
     """Return where a link leads behind which nothing is, or a ring of links; empty for any other path."""
     with suppress(OSError, ValueError):
-        if not path.exists():
+        if not exists(path):
             return str(path.readlink())
     return ""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from gateway import defaults
-from gateway.plain_file import expand_home
+from gateway.plain_file import expand_home, is_directory, is_file
 
 
 def running_rigs() -> list[str]:
@@ -28,12 +28,12 @@ def rigs_with_state() -> list[str]:
     from gateway.service.supervisor.run_options import default_state_root
 
     root = default_state_root()
-    return sorted(path.name for path in root.iterdir() if _has_run(path)) if root.is_dir() else []
+    return sorted(path.name for path in root.iterdir() if _has_run(path)) if is_directory(root) else []
 
 
 def _has_run(state: Path) -> bool:
     try:
-        return any(entry.is_dir() for entry in state.iterdir())
+        return any(is_directory(entry) for entry in state.iterdir())
     except NotADirectoryError:
         return False
     except OSError:  # another user's
@@ -43,7 +43,7 @@ def _has_run(state: Path) -> bool:
 def _has_state(name: str) -> bool:
     from gateway.service.supervisor.run_options import default_state_root
 
-    return Path(name).name == name and (default_state_root() / name).is_dir()
+    return Path(name).name == name and is_directory(default_state_root() / name)
 
 
 def known_rigs() -> list[str]:
@@ -56,7 +56,7 @@ def known_rigs() -> list[str]:
 def check_rig(name: str) -> None:
     """Raise UsageError for a rig that is neither known nor a file; it lists those that are."""
     path = expand_home(name)
-    if name in known_rigs() or _has_state(name) or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
+    if name in known_rigs() or _has_state(name) or is_file(path) or is_file(path.with_name(f"{path.name}.yaml")):
         return
     if os.path.lexists(path):
         raise click.UsageError(f"rig {name} {_what_is_there(name)}")
@@ -106,10 +106,10 @@ def file_of(name: str, state: Path) -> str:
     from gateway.cli.master.local_gateways import rig_running_on
 
     path = expand_home(name)
-    if name in _shipped() or path.is_file() or path.with_name(f"{path.name}.yaml").is_file():
+    if name in _shipped() or is_file(path) or is_file(path.with_name(f"{path.name}.yaml")):
         return name
     found = rig_running_on(state)
-    return found if found and Path(found).is_file() else name
+    return found if found and is_file(found) else name
 
 
 def _rig_on(state: Path) -> str | None:

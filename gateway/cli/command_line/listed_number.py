@@ -1,9 +1,10 @@
 """The number of a calibration, plant or recording as an argument: a file there is a common slip, and gets its own sentence."""
 
-from pathlib import Path
 from typing import Any
 
 import click
+
+from gateway.plain_file import exists
 
 
 class ListedNumber(click.IntRange):
@@ -21,5 +22,5 @@ class ListedNumber(click.IntRange):
             return text
         if text.lstrip("-").isdecimal():
             return super().convert(value, param, ctx)
-        what = "is a file" if Path(text).exists() else "is no number"
+        what = "is a file" if exists(text) else "is no number"
         return self.fail(f"{text} {what}: a number of `force-gateway {self._verb} list` is wanted", param, ctx)

@@ -11,6 +11,7 @@ import click
 
 from gateway.cli.diagnosis.progress_line import handle_interrupt
 from gateway.cli.errors import already_exists
+from gateway.plain_file import exists, is_directory, is_file
 from gateway.processes.durable_file import sync_path
 
 STDOUT: Final = Path("-")  # as the name of a file
@@ -22,7 +23,7 @@ def check_targets(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
     """Raise UsageError where two outputs, or an output and an input, are one file, FileNotFoundError where no directory is,
     IsADirectoryError where one is in the place of a file, OSError where links lead in a circle, E405 where a rig, a plant
     or another profile that somebody wrote would be lost."""
-    occupied = {path.resolve(): f"{path} is read" for path in inputs if path.exists()}
+    occupied = {path.resolve(): f"{path} is read" for path in inputs if exists(path)}
     for target in targets:
         with contextlib.suppress(FileNotFoundError):
             target.stat()  # links that lead in a circle lead nowhere
@@ -43,7 +44,7 @@ def check_page(target: Path, inputs: Iterable[Path]) -> None:
 
 def _is_written_by_hand(target: Path) -> bool:
     """Decide whether a target is YAML that is not ours: `--extend my-cell.yaml` made a plant of the rig's file."""
-    if target.suffix not in (".yaml", ".yml") or not target.is_file():
+    if target.suffix not in (".yaml", ".yml") or not is_file(target):
         return False
     head = target.read_bytes()[:_HEAD_CHARACTERS].decode("utf-8", "replace")
     return bool(head.strip()) and _OURS not in head
@@ -64,7 +65,7 @@ def write_all(texts: Mapping[Path, str]) -> None:
 def _write_all(texts: Mapping[Path, str], pressed: Sequence[int]) -> None:
     for path in texts:
         _refuse_place(path)
-    devices = [path for path in texts if path.exists() and not path.is_file()]
+    devices = [path for path in texts if exists(path) and not is_file(path)]
     places = {path: Path(os.path.realpath(path)) for path in texts if path not in devices}  # a link stays one
     beside = {path: place.with_name(f".{place.name}.{os.getpid()}") for path, place in places.items()}
     try:
@@ -96,7 +97,7 @@ def _told_by(path: Path) -> Iterator[None]:
 
 
 def _refuse_place(target: Path) -> None:
-    if not target.parent.is_dir():
+    if not is_directory(target.parent):
         raise FileNotFoundError(errno.ENOENT, "no such directory", str(target.parent))
-    if target.is_dir():
+    if is_directory(target):
         raise IsADirectoryError(errno.EISDIR, "it is a directory, and no file", str(target))

@@ -6,6 +6,7 @@ from typing import Any
 from gateway.cli import control_socket
 from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.master.wires import Wire
+from gateway.plain_file import is_file
 
 
 def sockets_near(wire: Wire, root: Path) -> list[Path]:
@@ -47,7 +48,7 @@ def rig_running_on(directory: Path) -> str | None:
 
     said = _ask_what_runs(directory)
     name, file = said.get("rig"), str(said.get("file", ""))
-    return file if name not in list_shipped("rig") and Path(file).is_file() else name
+    return file if name not in list_shipped("rig") and is_file(file) else name
 
 
 def is_there(directory: Path) -> bool:

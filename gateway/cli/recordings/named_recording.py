@@ -5,6 +5,7 @@ from typing import Final
 
 from gateway.cli.errors import CliError, no_such_recording
 from gateway.cli.options import state_directory
+from gateway.plain_file import exists
 from gateway.processes import exit_codes
 from gateway.recording import find_recording, recording_paths
 
@@ -18,7 +19,7 @@ def recording_path(name: str, rig: str | None, state: Path | None) -> Path:
     """Return the file of a recording: a path, a number, the `last` one, or the rig's `reference`. CliError (65) where there is
     none."""
     path = Path(name)
-    if path.exists():
+    if exists(path):
         return path
     if name == REFERENCE:
         return reference_file(state_directory(state, rig))

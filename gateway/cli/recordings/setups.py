@@ -1,11 +1,9 @@
 """The set-ups of a replay: the rig and calibration that a recording was made with, and another one to compare with."""
 
-from pathlib import Path
-
 from gateway.bsfm.model import Calibration
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice
-from gateway.plain_file import expand_home
+from gateway.plain_file import expand_home, is_file
 from gateway.plants.recorded_number import header_in_use
 from gateway.processes import exit_codes
 from gateway.profiles import Rig, list_shipped, load_calibration, read_rig
@@ -22,7 +20,7 @@ def own_setup(recording: Recording, state: StateChoice) -> tuple[ReplaySetup, li
 
     named = recording.header.get("rig")
     rig = rig_of(recording)
-    if rig is None and named and expand_home(meant := state.rig).is_file():
+    if rig is None and named and is_file(expand_home(meant := state.rig)):
         given = read_rig(meant)
         rig = given if given.name == named else None
     if rig is None:
@@ -88,4 +86,4 @@ def other_setup(which: str, own: ReplaySetup, state: StateChoice) -> ReplaySetup
 def _is_rig(which: str) -> bool:
     from gateway.profiles import check_file
 
-    return which in list_shipped("rig") or (Path(which).is_file() and check_file(which).kind == "rig")
+    return which in list_shipped("rig") or (is_file(which) and check_file(which).kind == "rig")

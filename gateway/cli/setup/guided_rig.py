@@ -19,6 +19,7 @@ from gateway.cli.command_line.questions import is_yes
 from gateway.cli.errors import CliError
 from gateway.cli.setup import port_probing as probing
 from gateway.cli.setup.starter_rig import starter_rig
+from gateway.plain_file import is_file
 
 if TYPE_CHECKING:
     from gateway.devices import DeviceProfile
@@ -262,7 +263,7 @@ def faults_of(rig: GuidedRig) -> Iterator[tuple[str, str]]:
 
 def own_files() -> list[Path]:
     """Return the YAML files of this folder, which a rig may name."""
-    return [path for path in (*Path().glob("*.yaml"), *Path().glob("devices/*.yaml")) if path.is_file()]
+    return [path for path in (*Path().glob("*.yaml"), *Path().glob("devices/*.yaml")) if is_file(path)]
 
 
 def set_in(text: str, section: str, key: str, value: Any) -> str:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Final
 from gateway.cli.errors import CliError
 from gateway.cli.system_service import unit_file
 from gateway.cli.system_service.user_access import refuse_closed_program, refuse_unreadable
+from gateway.plain_file import exists, is_directory
 from gateway.processes import exit_codes
 from gateway.profiles.find import list_shipped, locate, shipped_profiles_folder
 from gateway.profiles.http_sections import split_listen
@@ -130,7 +131,7 @@ def install_service(plan: Installation, root: Path) -> tuple[list[Path], bool]:
 def uninstall_service(stem: str, root: Path) -> Path:
     """Stop and remove the unit of a rig; its state directory, the user and the udev rule stay."""
     path = root / UNITS / unit_file.unit_name(stem)
-    if not path.exists():
+    if not exists(path):
         raise CliError(f"E107 {path}: there is no such unit; {_others(root)}", exit_codes.DATA)
     if root == Path("/"):
         run_command(("systemctl", "disable", "--now", path.name))
@@ -152,7 +153,7 @@ def run_command(words: Sequence[str], *, quiet: bool = False) -> str:
     except FileNotFoundError:
         raise CliError(f"E108 {words[0]} is not on this machine: {_WITHOUT}", exit_codes.DEVICE) from None
     if done.returncode and not quiet:
-        if words[0] == "systemctl" and not _BOOTED.is_dir():
+        if words[0] == "systemctl" and not is_directory(_BOOTED):
             raise CliError(f"E108 systemd does not run on this machine: {_WITHOUT}", exit_codes.DEVICE)
         said = (done.stderr or done.stdout).strip().splitlines()
         raise CliError(f"E108 {' '.join(words)}: {said[-1] if said else f'exit code {done.returncode}'}")
@@ -161,7 +162,7 @@ def run_command(words: Sequence[str], *, quiet: bool = False) -> str:
 
 def _own_command() -> Path:
     beside = Path(sys.executable).with_name("force-gateway")
-    return beside if beside.exists() else Path(sys.argv[0])
+    return beside if exists(beside) else Path(sys.argv[0])
 
 
 def _refuse_hidden(*paths: str) -> None:
@@ -192,7 +193,7 @@ def _refuse_link(path: Path) -> None:
 def _refuse_other_rig(path: Path, text: str) -> None:
     """Unit and state directory go by the name of the rig's file: of two `cell.yaml` the later one would get the calibrations,
     and at the next start the place, of the other's machine."""
-    there = _RIG_OF_UNIT.search(path.read_text(encoding="utf-8", errors="replace")) if path.exists() else None
+    there = _RIG_OF_UNIT.search(path.read_text(encoding="utf-8", errors="replace")) if exists(path) else None
     ours = _RIG_OF_UNIT.search(text)
     if there and ours and there[1] != ours[1]:
         stem = path.name.removeprefix(f"{unit_file.NAME}-").removesuffix(".service")

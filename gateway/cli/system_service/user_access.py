@@ -11,12 +11,13 @@ from pathlib import Path
 
 from gateway.cli.errors import CliError
 from gateway.cli.system_service.unit_file import USER
+from gateway.plain_file import exists, is_directory
 from gateway.processes import exit_codes
 
 
 def refuse_closed_program(program: Path) -> None:
     """Raise CliError E107 for a program that is not there, or that the service's user may not run."""
-    if not program.exists():
+    if not exists(program):
         raise CliError(
             f"E107 {program}: there is no such program; --command names the right one, and nothing was started",
             exit_codes.CONFIGURATION,
@@ -34,7 +35,7 @@ def refuse_unreadable(paths: Sequence[str]) -> None:
     """Raise CliError E107 where the service's user may not read one of these files, with the commands that let it."""
     files = [Path(path) for path in paths]
     on_the_way = dict.fromkeys(part for file in files for part in (*reversed(file.parents), file))
-    closed = [str(part) for part in on_the_way if not _may(part, "-x" if part.is_dir() else "-r")]
+    closed = [str(part) for part in on_the_way if not _may(part, "-x" if is_directory(part) else "-r")]
     if closed:
         these = shlex.join(closed)
         raise CliError(

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, TextIO
 
+from gateway.plain_file import exists
 from gateway.processes.event import ERROR, INFO, WARNING, EventRecord
 
 SOCKET: Final = Path("/run/systemd/journal/socket")
@@ -52,7 +53,7 @@ def _field(name: str, value: bytes) -> bytes:
 
 def journal_writer(path: Path = SOCKET) -> Callable[[EventRecord], None] | None:
     """Return what writes events to the journal, None where stderr goes elsewhere. It raises OSError as a terminal would."""
-    if not path.exists() or not is_journal(os.environ, sys.stderr):
+    if not exists(path) or not is_journal(os.environ, sys.stderr):
         return None
 
     def write(event: EventRecord) -> None:

@@ -53,6 +53,7 @@ _MEANINGS: Final = tuple(
         ("expected whitespace or line break", _TAG, True),
         ("expected ' ', but found", _TAG, True),
         ("that cannot start any token", "a value cannot begin with this character: quote the text"),
+        ("maximum nesting depth", _TOO_DEEP),  # a newer libyaml's, where brackets are read ahead of ours
         ("<document start>", "nothing can follow here: check the spaces before the keys"),
     )
 )

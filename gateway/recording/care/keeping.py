@@ -16,7 +16,7 @@ from math import inf
 from pathlib import Path
 from typing import Final
 
-from gateway.plain_file import closing_descriptor, open_plain
+from gateway.plain_file import closing_descriptor, exists, open_plain
 from gateway.processes.durable_file import give_to_owner, lock_directory, remove_if_possible
 from gateway.profiles.recordings_section import Retention
 from gateway.recording.layout import SUFFIX, number_in
@@ -45,7 +45,7 @@ def let_recording_go(path: Path) -> None:
 
 def is_kept(path: Path) -> bool:
     """Decide whether somebody keeps this recording."""
-    return path.with_suffix(_MARK).exists()
+    return exists(path.with_suffix(_MARK))
 
 
 def is_being_recorded(path: Path) -> bool:
@@ -170,7 +170,7 @@ def _set_mark(folder: int, name: str) -> None:
 def _has_next(path: Path) -> bool:
     """Decide it for all but a few at once: to look through 100 000 names for each took turns of control's process."""
     following = f"{int(path.stem) + 1:04d}"
-    return any(path.with_name(following + suffix).exists() for suffix in (SUFFIX, _GONE))
+    return any(exists(path.with_name(following + suffix)) for suffix in (SUFFIX, _GONE))
 
 
 def _numbers(folder: Path) -> list[int]:

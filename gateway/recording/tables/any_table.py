@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from gateway.plain_file import other_kind
+from gateway.plain_file import is_directory, other_kind
 from gateway.recording.errors import RecordingError
 from gateway.recording.foreign.table_text import ZIP, refuse_other_kinds
 from gateway.recording.layout import MAGIC
@@ -25,7 +25,7 @@ def read_table(path: Path, mapping: ColumnMapping | None = None, *, lenient: boo
 
 
 def _read_any(path: Path, mapping: ColumnMapping | None, lenient: bool) -> Recording:
-    if path.is_dir():
+    if is_directory(path):
         raise RecordingError(f"{path} is a directory: name the recording in it")
     if other := other_kind(path):
         raise RecordingError(

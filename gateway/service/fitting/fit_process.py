@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gateway.calibrations.store import CalibrationStore
     from gateway.service.fitting.ladder_fit import LadderFit
 
+from gateway.plain_file import exists
 from gateway.processes.scheduling import priority
 
 
@@ -67,7 +68,7 @@ def _describe_result(
 
     report, document = (store.directory / f"{number:04d}.{suffix}" for suffix in ("html", "json"))
     paths = {"report": str(report), "document": str(document)}
-    if is_new or not document.exists():
+    if is_new or not exists(document):
         fit.document.update(calibration=number, report=str(report))
         try:
             write_report(fit, report)

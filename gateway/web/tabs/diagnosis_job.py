@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from gateway.plain_file import exists
 from gateway.processes.durable_file import read_regular
 from gateway.processes.module_command import module_command
 from gateway.web.context import WebContext
@@ -136,7 +137,7 @@ def kept_diagnoses(state: Path) -> list[dict[str, Any]]:
     return [
         {"recording": number, "made_unix_s": path.stat().st_mtime} | _headline(path)
         for number, path in sorted(numbered, reverse=True)
-        if path.with_suffix(".html").exists()
+        if exists(path.with_suffix(".html"))
     ]
 
 

@@ -9,6 +9,7 @@ from starlette.requests import Request
 from gateway import defaults
 from gateway.calibrations.store import CalibrationStore
 from gateway.numbered_documents.store import StoredDocument
+from gateway.plain_file import exists
 from gateway.plants.store import NumberedPlant, PlantStore
 from gateway.profiles import ProfileError, Rig, load_rig
 from gateway.web.context import WebContext
@@ -51,7 +52,7 @@ def calibration_facts(context: WebContext) -> dict[str, Any]:
     selected = store.find_selected()
     rows = [_calibration_row(entry, selected.selection.number) for entry in reversed(store.list())]
     for row in rows:
-        row["has_report"] = (store.directory / f"{row['number']:04d}.json").exists()
+        row["has_report"] = exists(store.directory / f"{row['number']:04d}.json")
     if store.built_in:
         own = StoredDocument(store.built_in.number, store.built_in)
         row = _calibration_row(own, store.built_in.number if selected.selection.number is None else None)

@@ -113,9 +113,7 @@ def test_a_handshake_that_was_damaged_on_its_way_is_told_as_such(face: Face, fol
     damaged[-1] ^= 1
     line.send(bytes(damaged))
     (told,) = face.log
-    assert (
-        told.startswith("W244 127.0.0.1:40000: the handshake failed (") and "bad record mac): it speaks no TLS" in told
-    )
+    assert told.startswith("W244 127.0.0.1:40000: the handshake failed (") and "): it speaks no TLS" in told
     assert line.socket.ended
 
 

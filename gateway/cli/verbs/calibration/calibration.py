@@ -17,6 +17,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.plain_file import exists
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -184,7 +185,7 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
     from gateway.cli.diagnosis.outputs import write_all
 
     for path in texts:
-        if path.exists() and not force:
+        if exists(path) and not force:
             raise already_exists(path)
         path.parent.mkdir(parents=True, exist_ok=True)
     write_all(texts)

@@ -15,6 +15,7 @@ from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import count_of, json_option
+from gateway.plain_file import exists, is_file
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def _use_one_thread() -> None:
 
 def _absolute(name: str | None) -> str | None:
     """A worker elsewhere has another directory; a shipped name stays one."""
-    return str(Path(name).absolute()) if name and Path(name).is_file() else name
+    return str(Path(name).absolute()) if name and is_file(name) else name
 
 
 def _work(verb: str, compute: "Callable[[Task], Row]", columns: Sequence[str], options: dict[str, Any]) -> None:
@@ -144,8 +145,8 @@ def _own_files(folder: Path, *, is_fresh: bool) -> set[Path]:
     left."""
     from gateway.cli.fleet.files import KEPT, WRITTEN
 
-    found = [folder / name for name in WRITTEN if (folder / name).exists()]
-    if found and not is_fresh and not (folder / KEPT).exists():
+    found = [folder / name for name in WRITTEN if exists(folder / name)]
+    if found and not is_fresh and not exists(folder / KEPT):
         raise already_exists(found[0], "-o names another folder, --fresh takes this one")
     return {(folder / name).resolve() for name in (*WRITTEN, KEPT)}
 

@@ -17,6 +17,7 @@ from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.cli.recordings.named_recording import LAST, numbered_recording
+from gateway.plain_file import exists
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
 
@@ -103,7 +104,7 @@ def plot_command(*, number: int | str, output: Path | None, force: bool, state: 
     draw = {".html": recording_page, ".svg": recording_svg}.get(target.suffix.lower())
     if draw is None:
         raise click.UsageError(f"{target}: a plot is FILE.html or FILE.svg")
-    if target.exists() and not force:
+    if exists(target) and not force:
         raise already_exists(target)
     recording = read_recording(path)
     if why := why_no_picture(recording):
@@ -185,7 +186,7 @@ def export_command(
         room.write_csv(recording, sys.stdout.buffer)
         return
     target = output or Path(room.export_name(recording, int(path.stem), form))
-    if target.exists() and not force:
+    if exists(target) and not force:
         raise already_exists(target)
     (room.export_csv if form == "csv" else room.export_parquet)(recording, target)
     click.echo(f"wrote {recording.rows} rows to {target}", err=True)

@@ -9,7 +9,7 @@ from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.cli.command_line.since_option import YoungerRecords, since_option
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
-from gateway.plain_file import other_kind
+from gateway.plain_file import exists, is_directory, other_kind
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import AUDIT
 
@@ -106,14 +106,14 @@ def _value(value: Any) -> str:
 
 
 def _directory_of(state: StateChoice) -> None:
-    if not state.directory.is_dir():
+    if not is_directory(state.directory):
         raise no_state_directory(state.directory)
     place = state.directory / AUDIT
-    if place.is_dir():
+    if is_directory(place):
         return
-    if not (place.exists() or place.is_symlink()):
+    if not (exists(place) or place.is_symlink()):
         raise _no_audit(state)
-    kind = (other_kind(place) or "a file") if place.exists() else "a link to what is not there"
+    kind = (other_kind(place) or "a file") if exists(place) else "a link to what is not there"
     raise CliError(f"E106 {place}: it is {kind}, and no directory: a gateway can keep no audit there", exit_codes.DATA)
 
 

@@ -15,6 +15,7 @@ from gateway.cli.command_line.known_codes import entries_of
 from gateway.cli.command_line.since_option import YoungerRecords, since_option
 from gateway.cli.errors import no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.plain_file import is_directory
 from gateway.processes.event import SEVERITIES, EventRecord, format_event
 from gateway.processes.event_file import EventReader
 
@@ -44,7 +45,7 @@ def command(*, after: str, follow: bool, as_json: bool, state: StateChoice, **fi
     Time (UTC), severity, cause, code, sentence. `force-gateway explain CODE` says what to do.
     """
     directory, wanted = state.directory, _event_filter(**filters)
-    if not directory.is_dir():
+    if not is_directory(directory):
         raise no_state_directory(directory)
     with EventReader(directory) as reader:
         _show(_events_of(reader, after, follow), wanted, as_json)

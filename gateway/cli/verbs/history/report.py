@@ -8,6 +8,7 @@ import click
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import already_exists
 from gateway.cli.options import StateChoice, state_options
+from gateway.plain_file import exists
 
 EXAMPLES = ("report for-support.tar.gz", "report --show")
 
@@ -27,7 +28,7 @@ def command(*, file: Path, force: bool, show: bool, state: StateChoice) -> None:
     from gateway.cli.support_bundle import collect_parts, pack_bundle, parts_missing
     from gateway.profiles import read_rig
 
-    if file.exists() and not (force or show):
+    if exists(file) and not (force or show):
         raise already_exists(file)
     parts = collect_parts(state.directory, lambda: read_rig(state.rig).texts.items())
     if show:

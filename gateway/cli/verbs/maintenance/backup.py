@@ -7,6 +7,7 @@ import click
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import already_exists, no_state_directory
 from gateway.cli.options import StateChoice, count_of, state_options
+from gateway.plain_file import exists, is_directory
 
 EXAMPLES = ("backup cell.tar.gz", "backup today.tar.gz --rig demo")
 
@@ -23,13 +24,13 @@ def command(*, file: Path, force: bool, state: StateChoice) -> None:
     from gateway.cli.state_archive import links_in, pack_state
 
     directory = state.directory
-    if not directory.is_dir():
+    if not is_directory(directory):
         raise no_state_directory(directory)
     if file.absolute().parent.resolve().is_relative_to(directory.resolve()):
         raise click.UsageError(
             f"{file} is in {directory} itself: each backup would pack those before it; name a file elsewhere"
         )
-    if file.exists() and not force:
+    if exists(file) and not force:
         raise already_exists(file)
     links, names = links_in(directory), pack_state(directory, file)
     click.echo(f"packed {count_of(names, 'file')} of {directory} into {file}, {file.stat().st_size / 1e3:.1f} kB")

@@ -9,6 +9,7 @@ import click
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, count_of, state_options
+from gateway.plain_file import is_directory
 from gateway.processes import exit_codes, state_lock
 
 EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar.gz --state copy")
@@ -32,7 +33,7 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
         names = names_in(file)
         if not dry_run and (said := put_back(directory)):
             click.echo(said, err=True)
-        if directory.is_dir() and any(directory.iterdir()) and not force:
+        if is_directory(directory) and any(directory.iterdir()) and not force:
             raise already_exists(directory, "--force replaces it and keeps the old one")
         if dry_run:
             click.echo("\n".join([*names, f"{count_of(names, 'file')} would be restored to {directory}"]))
@@ -50,7 +51,7 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
 @contextmanager
 def _not_running(directory: Path) -> Iterator[None]:
     """Holds the lock that a running gateway holds; E104 when one does. Its file may have been deleted: not the directory's."""
-    if not directory.is_dir() or not any(directory.iterdir()):
+    if not is_directory(directory) or not any(directory.iterdir()):
         yield
         return
     with state_lock.hold_state_lock(directory) as is_ours:

@@ -15,7 +15,7 @@ from gateway.cli.command_line.numbers import Whole
 from gateway.cli.errors import CliError
 from gateway.modbus import Role
 from gateway.modbus.certificate import ROLES
-from gateway.plain_file import tell_place_and_refusal
+from gateway.plain_file import exists, tell_place_and_refusal
 from gateway.processes import exit_codes
 
 _HOSTS: Final = ("localhost", "127.0.0.1")
@@ -92,7 +92,7 @@ def command(*, folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], d
     A CA, the gateway's certificate and one per client, with the role in it. Where DIR holds a CA already, it signs further
     clients. Nothing is overwritten. The CA's key is not protected by a password: for a plant, keep it off the machine.
     """
-    is_first = not (folder / "ca.crt").exists()
+    is_first = not exists(folder / "ca.crt")
     if not clients and is_first:
         clients = parse_clients(click.get_current_context(), click.Option(["--client"]), _CLIENTS)
     if not is_first and not clients and not hosts:
@@ -105,7 +105,7 @@ def command(*, folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], d
 
 def _refuse_to_overwrite(folder: Path, names: list[str]) -> None:
     for path in (folder / f"{name}.{kind}" for name in names for kind in ("crt", "key")):
-        if path.exists():
+        if exists(path):
             raise CliError(f"E405 {path} exists and was left alone; choose another name or DIR, or remove it first")
 
 
@@ -114,7 +114,7 @@ def _make(folder: Path, hosts: tuple[str, ...], clients: dict[str, Role], days: 
 
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     made: dict[str, certificates.Signed] = {}
-    if (folder / "ca.crt").exists():
+    if exists(folder / "ca.crt"):
         try:
             ca = certificates.load_ca(folder)
         except (OSError, ValueError) as error:

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from gateway.cli.errors import already_exists
+from gateway.plain_file import exists
 
 EXAMPLES = ("init left-cell", "init right-cell --no-guided")
 
@@ -38,7 +39,7 @@ def command(*, name: str, guided: bool | None) -> None:
         raise click.UsageError(f"{target.stem} is no name for a rig: small letters, digits, . _ -, such as my-cell")
     if target.stem in list_shipped("rig"):
         raise click.UsageError(f"{target.stem} is the name of a shipped rig; choose another")
-    if target.exists():
+    if exists(target):
         raise already_exists(target, "choose another name")
     if not os.access(".", os.W_OK):  # before anything is asked
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))

@@ -3,11 +3,11 @@
 import os
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 
 from gateway.devices import DeviceProfile, DeviceRole, cell_host
 from gateway.devices.device_checks.watchdog import FEEDS_PER_TIME
+from gateway.plain_file import is_directory, is_file
 from gateway.profiles.rigs.checks.parts import Check, Found, Parts
 from gateway.profiles.rigs.device_settings import find_unfit_settings
 from gateway.profiles.rigs.edit_marks import PLACEHOLDER
@@ -68,7 +68,7 @@ def why_no_path(port: str) -> str:
         cure = "put your adapter's path here, `force-gateway ports` lists them"
         return f"{port} is a placeholder: {cure}"
     if port.startswith("/"):
-        other = "a directory" if Path(port).is_dir() else "a file" if Path(port).is_file() else ""
+        other = "a directory" if is_directory(port) else "a file" if is_file(port) else ""
         return f"{port} is {other} and no serial port: `force-gateway ports` lists what is plugged in" if other else ""
     wanted = f'"{port}" is not the path of a device, such as /dev/serial/by-id/usb-...'
     cure = "a device is on a serial line, and what has Ethernet needs a serial server whose driver makes a port here"
