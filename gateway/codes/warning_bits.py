@@ -19,6 +19,10 @@ class WarningBit(IntFlag):
         member.explanation = explanation
         return member
 
+    def __invert__(self) -> Self:
+        """Return all other bits. Python 3.11.2, Debian 12's, forgets those above, of members that have more than a value."""
+        return type(self)(sum(type(self)) ^ self)
+
     @property
     def code(self) -> str:
         """`A301`, of a single bit."""

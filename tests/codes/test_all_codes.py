@@ -131,6 +131,13 @@ def test_numbers_survive_a_way_through_their_enumerations() -> None:
     assert [bit.code for bit in WarningBit if bit & both] == ["A401", "A310"]
 
 
+@pytest.mark.parametrize("ended", [*WarningBit, WarningBit.RESTARTED | WarningBit.MASTER_LOST])
+def test_what_ends_takes_no_other_warning_with_it(ended: WarningBit) -> None:
+    """By Python 3.11.2's own `~` the end of noise took each warning above it out of the registers."""
+    everything = WarningBit(sum(WarningBit))
+    assert [bit for bit in WarningBit if bit not in everything & ~ended] == [bit for bit in WarningBit if bit in ended]
+
+
 def test_a_name_can_mean_a_fault_and_a_refusal() -> None:
     assert [entry.code for entry in find_codes("not-finite")] == ["W207", "A320"]
 

@@ -90,8 +90,10 @@ def test_the_bit_stands_while_either_line_is_noisy() -> None:
     assert len(wired.said("A341")) == 2
     wired.run(8.5)
     assert wired.warnings & NOISE, "the output's line was noisy eight seconds ago"
+    wired.loop.warnings.bits |= WarningBit.MODEL_DIFFERS
     wired.run(1.6)
     assert not wired.warnings & NOISE
+    assert wired.warnings & WarningBit.MODEL_DIFFERS, "which has nothing to do with a line"
 
 
 def test_a_line_of_which_nothing_can_be_read_is_not_blamed_on_a_motor() -> None:
