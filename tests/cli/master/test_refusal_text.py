@@ -109,18 +109,20 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("high_n", "said"),
+    ("low_n", "high_n", "said"),
     [
-        (50.0, "W204 force_setpoint = 65.00 N: allowed 0 .. 50 N by the calibration in use"),
-        (65.2, "W204 force_setpoint = 65.00 N: beyond the rig's own limit"),
-        (0.0, "W204 value out of range: exception 03"),
+        (0.0, 50.0, "W204 force_setpoint = 65.00 N: allowed 0 .. 50 N by the calibration in use"),
+        (1.0, 65.2, "W204 force_setpoint = 65.00 N: beyond the rig's own limit"),
+        (0.0, 0.0, "W204 value out of range: exception 03"),
+        (70.0, 80.0, "W204 force_setpoint = 65.00 N: the calibration in use is for 70 N and more; 0 is taken"),
     ],
 )
 def test_a_limit_that_only_registers_can_tell_is_told(
-    high_n: float, said: str, fake, call, monkeypatch, tmp_path: Path
+    low_n: float, high_n: float, said: str, fake, call, monkeypatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     fake.bank.refuse[1] = (3, RefusalReason.OUT_OF_RANGE)
+    fake.bank.set("force_low@active", low_n)
     fake.bank.set("force_high@active", high_n)
     answer = call("write", "force_setpoint=65", "--gateway", fake.address)
     assert answer.exit_code == 1
