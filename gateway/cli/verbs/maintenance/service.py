@@ -1,5 +1,6 @@
 """`service`: a gateway that systemd keeps: install, uninstall, status, logs."""
 
+import json
 import os
 import shlex
 from pathlib import Path
@@ -9,6 +10,7 @@ import click
 
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
+from gateway.cli.options import json_option
 from gateway.processes import exit_codes
 
 _ROOT = click.option(
@@ -91,7 +93,8 @@ def uninstall_command(*, rig: str, root: Path) -> None:
 @command.command(name="status")
 @click.argument("rig", required=False)
 @_ROOT
-def status_command(*, rig: str | None, root: Path) -> None:
+@json_option
+def status_command(*, rig: str | None, root: Path, as_json: bool) -> None:
     """Show each service: whether it runs, since when, how often it was started again, what it says of itself.
 
     Exit code 1 when one of them does not run.
@@ -99,8 +102,10 @@ def status_command(*, rig: str | None, root: Path) -> None:
     from gateway.cli.system_service.unit_status import read_status
 
     found = [read_status(unit) for unit in _units_of(rig, root)]
-    for one in found:
-        click.echo(one.sentence)
+    if as_json:
+        click.echo(json.dumps([one.facts for one in found], indent=2))
+    else:
+        click.echo("\n".join(one.sentence for one in found))
     if not all(one.is_running for one in found):
         raise click.exceptions.Exit(exit_codes.FAILED)
 
