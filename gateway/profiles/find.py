@@ -82,7 +82,7 @@ def _called(kind: str) -> str:
 
 def _is_file(path: Path) -> bool:
     try:
-        return path.is_file()
+        return path.is_file() and not other_kind(path)
     except (OSError, ValueError):  # a name that is too long, or holds what no file name may
         return False
 
