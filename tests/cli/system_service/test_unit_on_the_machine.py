@@ -174,6 +174,13 @@ def test_an_end_that_nobody_has_asked_systemd_for_starts_it_again() -> None:
     assert str(exit_codes.OK) not in setting("RestartPreventExitStatus", "").split()
 
 
+@pytest.mark.parametrize("verb", ["install", "uninstall"])
+def test_a_mistyped_root_is_not_made(verb: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(command, ["service", verb, "demo", "--root", str(tmp_path / "imgae")])
+    assert done.exit_code == exit_codes.USAGE and "imgae is not there: mkdir -p makes a new one" in done.stderr
+    assert not any(tmp_path.iterdir())
+
+
 def test_the_status_is_told_to_programs_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(unit_status, "run_command", lambda words: "ActiveState=active\nNRestarts=1\n")
     done = CliRunner().invoke(command, ["service", "status", "demo", "--json"])

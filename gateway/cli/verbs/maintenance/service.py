@@ -13,9 +13,18 @@ from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
 from gateway.processes import exit_codes
 
+
+def _existing_root(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
+    """Refuse one that is not there: by a slip of the pen a tree of an image came to be beside the image."""
+    if not value.is_dir():
+        raise click.BadParameter(f"{value} is not there: mkdir -p makes a new one")
+    return value
+
+
 _ROOT = click.option(
     "--root",
     type=GivenPath(file_okay=False),
+    callback=_existing_root,
     default=Path("/"),
     help="Write below this folder, and start nothing: for an image.",
 )
@@ -23,7 +32,7 @@ _ROOT = click.option(
 
 EXAMPLES = (
     "service install irc5-cell --dry-run --command /opt/force-gateway/bin/force-gateway",
-    "service install demo --root image --command /opt/force-gateway/bin/force-gateway",
+    "service install irc5-cell --dry-run --allow 192.168.125.0/24 --command /opt/force-gateway/bin/force-gateway",
 )
 
 
