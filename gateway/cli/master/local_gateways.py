@@ -9,8 +9,12 @@ from gateway.cli.master.wires import TcpWire, Wire
 
 
 def sockets_near(wire: Wire, root: Path) -> list[Path]:
-    """Find state directories below root with a control socket, none where the wire leads to another machine."""
-    return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+    """Find state directories below root with a control socket, none where the wire leads to another machine, or where another
+    user keeps them to himself."""
+    try:
+        return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+    except PermissionError:
+        return []
 
 
 def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:

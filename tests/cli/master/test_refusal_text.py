@@ -108,6 +108,16 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
     assert is_asked(RtuWire("/dev/ttyS9", SerialSettings(baud=19200))), "the other end of a line is not known"
 
 
+def test_directories_of_another_user_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A `write` that was refused ended with E105, of the folder, and without the reason."""
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied", str(tmp_path))
+
+    monkeypatch.setattr(Path, "glob", refuse)
+    assert local_gateways.sockets_near(TcpWire("127.0.0.1", 5020), tmp_path) == []
+
+
 @pytest.mark.parametrize(
     ("low_n", "high_n", "said"),
     [
