@@ -12,6 +12,7 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import BinaryIO, Final, Literal
 
@@ -161,7 +162,17 @@ def tell_place_and_refusal(error: OSError) -> str:
 
 
 def _other_kind(status: os.stat_result) -> str:
-    return "" if stat.S_ISREG(status.st_mode) else _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+    if stat.S_ISREG(status.st_mode):  # /proc/kmsg says that it is a file, and is waited for as a pipe is
+        return "a part of /proc" if status.st_dev == _device_of_proc() else ""
+    return _KINDS.get(stat.S_IFMT(status.st_mode), "something else")
+
+
+@cache
+def _device_of_proc() -> int:
+    try:
+        return os.stat("/proc").st_dev  # noqa: PTH116
+    except OSError:
+        return -1
 
 
 def _refuse_other(status: os.stat_result, path: Path | str) -> None:

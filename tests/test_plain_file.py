@@ -17,6 +17,7 @@ from gateway.plain_file import (
     other_kind,
     read_plain,
 )
+from gateway.profiles.find import locate
 from tests.other_kinds import MAKERS, never_waiting, put
 
 DOORS: dict[str, Callable[[Path], object]] = {
@@ -37,6 +38,17 @@ def test_what_is_no_plain_file_is_refused_by_its_kind_and_place(door: str, kind:
     assert refused.value.filename == str(path)
     assert isinstance(refused.value, IsADirectoryError) == (kind == "a directory")
     assert other_kind(path) == kind
+
+
+def test_what_the_kernel_shows_as_a_file_is_none() -> None:
+    """Whoever named /proc/kmsg waited for the next line of the kernel's log."""
+    path = Path("/proc/self/status")
+    for door in DOORS.values():
+        with pytest.raises(OSError, match="a part of /proc"):
+            door(path)
+    assert other_kind(path) == "a part of /proc" and other_kind(__file__) == ""
+    with pytest.raises(FileNotFoundError, match="is a part of /proc, and no rig file"):
+        locate("rig", str(path))
 
 
 @pytest.mark.parametrize("kind", MAKERS)

@@ -113,11 +113,28 @@ class VerbGroup(click.Group):
                 error.__context__, KeyboardInterrupt
             )
             raise
+        except click.BadOptionUsage as error:
+            verb = self.get_command(ctx, ctx.invoked_subcommand or "")
+            told = _tell_argument(verb, error.option_name, ctx)
+            raise click.BadOptionUsage(error.option_name, error.message + told, error.ctx) from None
         except (click.ClickException, click.exceptions.Exit, BrokenPipeError):
             raise
         except Exception as error:
             command_line = " ".join(word for word in sys.argv[1:] if word != "--debug")
             raise translate_error(error, command_line, debug=bool(ctx.params.get("debug"))) from error
+
+
+def _tell_argument(verb: click.Command | None, option_name: str, ctx: click.Context) -> str:
+    """Return what belongs behind an option that came without its argument; empty where nothing does. click tells of no
+    subcommand, so it counts where all of them mean the same."""
+    commands = [verb, *(verb.commands.values() if isinstance(verb, click.Group) else ())]
+    options = [option for one in commands if one for option in one.params if isinstance(option, click.Option)]
+    told = {
+        f" {option_name} {option.make_metavar(ctx)}{': ' + option.help if option.help else ''}"
+        for option in options
+        if option_name in option.opts and not option.is_flag
+    }
+    return told.pop() if len(told) == 1 else ""
 
 
 @click.group(cls=VerbGroup, help=HELP, context_settings={"help_option_names": ["-h", "--help"]})

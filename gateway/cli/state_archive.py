@@ -75,6 +75,17 @@ def names_in(source: Path) -> list[str]:
             return [member.name.removeprefix(f"{_TOP}/") for member in members if member.isfile()][1:]
 
 
+def rig_in(source: Path) -> str:
+    """Return the name of the state directory that was packed, which is its rig's unless --state had named another; empty
+    where it is no name of a directory. For an archive that was checked."""
+    with tarfile.open(source, "r:gz") as archive:
+        manifest = archive.extractfile(_MANIFEST)
+        assert manifest, "which was checked"
+        name = json.loads(manifest.read(_LONGEST_MANIFEST)).get("rig")
+    is_name = isinstance(name, str) and name.isprintable() and Path(name).name == name and not name.startswith(".")
+    return name if is_name else ""
+
+
 def unpack_state(source: Path, state: Path) -> Path | None:
     """Put the archive's content where `state` is, or leads, at once; where the previous content is kept, None if there was
     none."""

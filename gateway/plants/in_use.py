@@ -26,11 +26,15 @@ _HAS_MEASURED: Final = (
 )
 
 
+def own_plant(rig: Rig) -> PlantProfile:
+    """Return the plant of the rig's file; of one that names none the one that stands in its place."""
+    return rig.plant_profile or rig.fallback_plant or load_plant(FALLBACK_PLANT)
+
+
 def compensation_on(rig: Rig, plant: PlantProfile) -> Compensation:
     """Return what control takes back of a plant on this rig: of what differs from the rig's own plant, and of what it could
     take back of that one, too."""
-    own = rig.plant_profile or rig.fallback_plant or load_plant(FALLBACK_PLANT)
-    compensation = compensation_of(without_compensable(own.plant), plant.plant)
+    compensation = compensation_of(without_compensable(own_plant(rig).plant), plant.plant)
     return _tell_calibrated(rig, in_simulation(compensation) if rig.simulated else compensation)
 
 

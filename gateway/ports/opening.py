@@ -14,6 +14,7 @@ from gateway.ports.listing import present_paths
 
 _PARITY: Final = {"none": serial.PARITY_NONE, "even": serial.PARITY_EVEN, "odd": serial.PARITY_ODD}
 _MINIMUM, _TIME = termios.VMIN, termios.VTIME
+_MAKER_OF_TERMINALS: Final = os.makedev(5, 2)  # /dev/ptmx, wherever it is, see pts(4)
 TerminalSettings = list[Any]  # as termios.tcgetattr returns them
 Explain = Callable[[str, Exception], PortError]
 
@@ -96,6 +97,10 @@ def _take_descriptor(port: serial.Serial) -> int:
 
 
 def _open_configured(path: str, settings: SerialSettings, timeout_s: float) -> serial.Serial:
+    if os.path.exists(path) and os.stat(path).st_rdev == _MAKER_OF_TERMINALS:  # noqa: PTH110, PTH116
+        raise OSError(
+            errno.ENOTTY, os.strerror(errno.ENOTTY), path
+        )  # it opens, as a new terminal, and nobody answers there
     return serial.Serial(
         path,
         settings.baud,

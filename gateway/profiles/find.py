@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 import gateway
-from gateway.plain_file import DIRECTORY, expand_home, is_directory, is_file, other_kind
+from gateway.plain_file import DIRECTORY, expand_home, is_directory, other_kind
 from gateway.profiles.kinds.file_kind import CALLED, is_foreign, keys_at_the_top, kind_of
 from gateway.profiles.strict_yaml.faults import closest, one_of
 
@@ -82,7 +82,7 @@ def _called(kind: str) -> str:
 
 def _is_file(path: Path) -> bool:
     try:
-        return is_file(path)
+        return not other_kind(path)
     except (OSError, ValueError):  # a name that is too long, or holds what no file name may
         return False
 

@@ -113,7 +113,9 @@ def _telemetry_lines(rig: Rig) -> Iterator[str]:
     told = {}
     if rig.opcua:
         host, port = split_listen(rig.opcua.listen)
-        told["opcua", "asyncua"] = f"{_url('opc.tcp', host, port)}/{_beyond(host)}"
+        told["opcua", "asyncua"] = (
+            f"{_url('opc.tcp', host, port)}/{_beyond(host)}        (starting: the log tells when it serves)"
+        )
     if mqtt := rig.mqtt:
         node = f", spBv1.0/{mqtt.sparkplug.group}/+/{mqtt.sparkplug.node or rig.name}" if mqtt.sparkplug else ""
         topics = f"{mqtt.base_topic or f'force-gateway/{rig.name}'}/#{node}"

@@ -86,7 +86,7 @@ async def serve(options: dict[str, Any], log: EventLog) -> None:
     await server.init()
     bound_publishing(server.iserver.subscription_service, LOOK_S)
     settings = options["settings"]
-    server.set_endpoint(f"opc.tcp://{settings['listen']}/")
+    server.set_endpoint(place := f"opc.tcp://{settings['listen']}/")
     server.set_server_name("force-gateway")
     server.set_security_policy([asyncua.ua.SecurityPolicyType.NoSecurity])
     server.allow_remote_admin(False)  # else whoever calls himself admin may write and delete every node
@@ -96,6 +96,7 @@ async def serve(options: dict[str, Any], log: EventLog) -> None:
     await nodes.show(await _look(link))
     try:
         async with server:
+            log("start", f"OPC UA is served: {place}")  # its library takes seconds to load, on a busy machine a minute
             await _show_forever(nodes, link)
     except OSError as error:
         log("start", f"E127 opcua.listen: {error.strerror or error}")

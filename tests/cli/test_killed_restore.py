@@ -1,4 +1,4 @@
-"""A restore that is killed between its two renames leaves the state under another name: the next start puts it back."""
+"""Where a restore puts a state, and one that is killed between its two renames: the next start puts the state back."""
 
 import shutil
 from pathlib import Path
@@ -85,3 +85,26 @@ def test_a_gateway_begins_with_it(state: Path, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(guardian, "hold_state_lock", see)
     with pytest.raises(SeenError, match="calibrations"):
         guardian.run(RunOptions(state=state))
+
+
+@pytest.mark.parametrize(
+    ("packed", "words", "place"),
+    [
+        ("my-cell", (), "my-cell"),
+        ("my-cell", ("--rig", "my-cell"), "my-cell"),
+        ("my-cell", ("--rig", "demo"), "demo"),
+        (".hidden", (), "demo"),
+    ],
+)
+def test_without_a_directory_a_backup_goes_where_the_rig_has_it_that_was_packed(
+    packed: str, words: tuple[str, ...], place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a new machine, which did not know the cell, it went to demo's."""
+    archive = str(tmp_path / "b.tar.gz")
+    (tmp_path / packed / "audit").mkdir(parents=True)
+    (tmp_path / packed / "audit" / "head").write_text("1")
+    assert CliRunner().invoke(command, ["backup", archive, "--state", str(tmp_path / packed)]).exit_code == 0
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "new"))
+    answer = CliRunner().invoke(command, ["restore", archive, *words])
+    assert answer.exit_code == 0, answer.output
+    assert (tmp_path / "new" / "force-gateway" / place / "audit" / "head").read_text() == "1"

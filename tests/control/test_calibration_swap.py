@@ -194,3 +194,20 @@ def test_what_a_swap_carries_over_does_not_push_a_tool_that_loses_its_contact_ri
     bench.plant.contact = False
     bench.seconds_until(lambda output: not output.status & StatusBit.CONTACT, 1.0)
     assert bench.run(0.05).voltage_v < bsfm().voltage_v(bench.settings.defaults.precontact_force_n, 1.0)[0] + 0.1
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.7, 1.0, 1.5])
+def test_a_set_that_comes_amid_a_ladder_changes_neither_its_volts_nor_lets_its_stop_raise_them(scale: float):
+    bench = Bench()
+    bench.run(1.0)
+    bench.controller.active_run.ask(CalibrationPlan(groups=1, step_v=1.0, minor_points=0, response_steps=0))
+    bench.seconds_until(lambda output: output.voltage_v > 3.4, 20.0)
+    begun_v, run = bench.voltage_v, bench.controller.active_run.run
+    bench.controller.use(CalibrationInUse(bsfm(scale=scale), 2))
+    assert bench.run(0.05).voltage_v == begun_v
+    assert run.model == bsfm(), "it goes on by what it began with"
+    bench.controller.active_run.ask_stop("stopped")
+    first = len(bench.history)
+    bench.run(2.0)
+    volts = [record.output.voltage_v for record in bench.history[first:]]
+    assert max(volts) <= begun_v and volts[-1] == 0.0

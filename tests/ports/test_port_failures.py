@@ -104,7 +104,7 @@ def test_a_ring_of_links_is_told_once_and_without_a_number(ear: Any, tmp_path: P
 def test_a_file_is_no_serial_port(ear: Any, tmp_path: Path) -> None:
     file = tmp_path / "port"
     file.write_text("")
-    for path in (str(file), str(tmp_path), "/dev/null"):
+    for path in (str(file), str(tmp_path), "/dev/null", "/dev/ptmx"):
         told = asyncio.run(told_by_opening(ear, path))
         assert str(told) == f"E102 {path} is no serial port: `force-gateway ports` lists those of this machine"
 

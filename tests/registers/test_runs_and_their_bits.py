@@ -155,7 +155,7 @@ def test_of_two_bits_that_were_held_the_lower_one_is_named(make_bank, master_of)
         ((5.0, 40.0), (0, 500, 4000), (499, 4001)),
         ((-5.0, 40.0), (0, 1, 4000), (4001,)),
         ((5.0, 90.0), (0, 500, 6000), (499, 6001)),
-        ((70.0, 90.0), (0, 6000), (5999, 6001)),
+        ((70.0, 90.0), (0,), (1, 5999, 6000, 6001, 7000)),
     ],
 )
 def test_a_calibration_narrows_what_may_be_set_at_both_ends(make_bank, master_of, limits_n, taken, refused) -> None:

@@ -229,7 +229,10 @@ def test_opc_ua_and_the_broker_are_told_as_the_page_is(monkeypatch: pytest.Monke
     rig = replace(demo(), opcua=OpcUa(listen="0.0.0.0:4840"), mqtt=mqtt)
     monkeypatch.setattr(banner, "is_installed", lambda library: True)
     told = format_banner(ready(rig=rig))
-    assert "  opcua        opc.tcp://127.0.0.1:4840/        (and on this machine's other addresses)\n" in told
+    assert (
+        "  opcua        opc.tcp://127.0.0.1:4840/        (and on this machine's other addresses)        (starting: "
+        in told
+    )
     assert "  mqtt         broker.hall:1883   force-gateway/demo/#, spBv1.0/plant/+/demo\n" in told
     named = replace(rig, opcua=None, mqtt=Mqtt(host="fd00::5", port=8883, base_topic="cells/7"))
     assert "  mqtt         [fd00::5]:8883   cells/7/#\n" in format_banner(ready(rig=named))

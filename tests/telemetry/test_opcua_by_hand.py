@@ -3,6 +3,7 @@
 import asyncio
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import AsyncMock
 
 import pytest
 
@@ -79,8 +80,9 @@ def test_it_looks_five_times_a_second_however_long_a_look_takes(monkeypatch: pyt
     assert slept == [pytest.approx(0.15), 0.0]
 
 
-def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(
-    ua: Any, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_taken", [True, False])
+def test_a_port_that_is_taken_is_told_or_that_it_serves_and_all_is_bounded_and_filled(
+    is_taken: bool, ua: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     did = list[Any]()
 
@@ -100,7 +102,8 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(
 
         async def __aenter__(self) -> None:
             did.append("serves")
-            raise OSError(98, "Address already in use")
+            if is_taken:
+                raise OSError(98, "Address already in use")
 
         async def __aexit__(self, *_: object) -> None: ...
 
@@ -116,12 +119,14 @@ def test_a_port_that_is_taken_is_told_and_what_is_served_is_bounded_and_filled(
     monkeypatch.setattr(opcua_process, "bound_connections", lambda wire, log: did.append(wire.__name__))
     monkeypatch.setattr(opcua_process, "bound_publishing", lambda service, least_s: did.append((service, least_s)))
     monkeypatch.setattr(opcua_process, "GatewayNodes", Nodes)
+    monkeypatch.setattr(opcua_process, "_show_forever", AsyncMock())
     options = {"settings": {"name": "demo", "listen": "127.0.0.1:4840"}, "state": "/nowhere"}
     log: Any = lambda cause, sentence: did.append((cause, sentence))  # noqa: E731
     asyncio.run(opcua_process.serve(options, log))
     assert did == [
         "asyncua.server.binary_server_asyncio", ("subscriptions", 0.2), "opc.tcp://127.0.0.1:4840/", ["NoSecurity"],
-        ("admin", False), "demo", None, "serves", ("start", "E127 opcua.listen: Address already in use"),
+        ("admin", False), "demo", None, "serves",
+        ("start", "E127 opcua.listen: Address already in use" if is_taken else "OPC UA is served: opc.tcp://127.0.0.1:4840/"),
     ]  # fmt: skip
 
 

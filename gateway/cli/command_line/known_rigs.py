@@ -1,8 +1,8 @@
 """Which rigs there are, and which is meant: a shipped name, a rig file, or one that has run here.
 
-Without a name it is the one whose gateway runs on this machine, where that is one; else demo. Of a state directory that was
-given alone it is the one whose gateway runs on it, else the one whose recordings lie there: by the files of demo its own
-calibration, limits and retention would be another rig's.
+Without a name it is the one whose gateway runs on this machine, where that is one; where several do, and none of them is
+demo, it has to be named; else demo. Of a state directory that was given alone it is the one whose gateway runs on it, else
+the one whose recordings lie there: by the files of demo its own calibration, limits and retention would be another rig's.
 """
 
 import os
@@ -89,7 +89,8 @@ def _shipped() -> list[str]:
 
 
 def choose_rig(given: str | None, state: Path | None) -> str:
-    """Return the rig that is meant. state: the directory that was given instead: then the rig need not be known."""
+    """Return the rig that is meant. state: the directory that was given instead: then the rig need not be known. UsageError
+    where several run here and none of them is demo: of demo nobody has spoken."""
     if given is not None:
         if state is None:
             check_rig(given)
@@ -97,6 +98,10 @@ def choose_rig(given: str | None, state: Path | None) -> str:
     if state is not None:
         return _rig_on(state) or defaults.RIG
     running = running_rigs()
+    if len(running) > 1 and defaults.RIG not in running:
+        raise click.UsageError(
+            f"{' and '.join(running)} run here: --rig says which one is meant, such as --rig {running[0]}."
+        )
     return running[0] if len(running) == 1 else defaults.RIG
 
 

@@ -195,7 +195,14 @@ class GatewayClient:
         """Return the client with its wire open."""
         if self._client is None or not self._client.connected:
             logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)  # its errors reach the user as ours
-            self._client = self.wire.connect()
+            try:
+                self._client = self.wire.connect()
+            except CliError as error:
+                if self._has_answered:  # whoever presses has no time to look for others
+                    raise
+                from gateway.cli.master.local_gateways import tell_running
+
+                raise CliError(f"{error}{tell_running(self.wire)}", error.exit_code) from None
         return self._client
 
 

@@ -5,13 +5,17 @@ from typing import Any
 
 from gateway.cli import control_socket
 from gateway.cli.errors import CliError, NoAnswerError
-from gateway.cli.master.wires import Wire
+from gateway.cli.master.wires import TcpWire, Wire
 from gateway.plain_file import is_file
 
 
 def sockets_near(wire: Wire, root: Path) -> list[Path]:
-    """Find state directories below root with a control socket, none where the wire leads to another machine."""
-    return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+    """Find state directories below root with a control socket, none where the wire leads to another machine, or where another
+    user keeps them to himself."""
+    try:
+        return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+    except PermissionError:
+        return []
 
 
 def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
@@ -19,6 +23,17 @@ def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
     do."""
     directory, _ = find_state_behind(wire, root)
     return _ask_what_runs(directory) if directory else None
+
+
+def tell_running(wire: Wire) -> str:
+    """Return which gateways of this user run on other ports of this machine, for who found none behind this wire."""
+    from gateway.service.supervisor.run_options import default_state_root
+
+    if not isinstance(wire, TcpWire):
+        return ""
+    running = [_ask_what_runs(directory) for directory in sockets_near(wire, default_state_root())]
+    told = [f"{one['rig']} on port {one['port']}" for one in running if one.get("rig") and one.get("port")]
+    return f"; here run {', '.join(told)}" if len(told) > 1 else f"; here runs {told[0]}" if told else ""
 
 
 def find_state_behind(wire: Wire, root: Path) -> tuple[Path | None, str]:

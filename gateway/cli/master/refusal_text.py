@@ -52,7 +52,8 @@ def _known_limit(client: GatewayClient, address: int, reason: RefusalReason) -> 
     if reason is not RefusalReason.OUT_OF_RANGE or address != register.address:
         return ""
     try:
-        value, high = client.read_values([client.register_map.find(n) for n in ("refusal_value", "force_high@active")])
+        names = ("refusal_value", "force_low@active", "force_high@active")
+        value, low, high = client.read_values([client.register_map.find(name) for name in names])
     except (CliError, RefusedError, LookupError):
         return ""
     if not high.is_available or high.value <= 0.0:
@@ -60,6 +61,8 @@ def _known_limit(client: GatewayClient, address: int, reason: RefusalReason) -> 
     asked = f"force_setpoint = {value.value:.2f} N"
     if not 0.0 <= value.value <= high.value:
         return f"{asked}: allowed 0 .. {high.value:.4g} N by the calibration in use; the rig's own limit may be lower"
+    if low.is_available and 0.0 < value.value < low.value:
+        return f"{asked}: the calibration in use is for {low.value:.4g} N and more; 0 is taken"
     return f"{asked}: beyond the rig's own limit, which no register tells; the calibration in use goes to {high.value:.4g} N"
 
 

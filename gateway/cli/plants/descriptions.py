@@ -16,7 +16,8 @@ def describe_provenance(plant: NumberedPlant) -> Iterator[str]:
     """Yield where a plant comes from: its recordings and causes."""
     source = plant.provenance
     if not plant.number:
-        yield f"plant 0 ({plant.profile.name}), the rig's own"
+        whose = "stands in: the rig names none" if source.start else "the rig's own"
+        yield f"plant 0 ({plant.profile.name}), {whose}"
         return
     yield f"plant {plant.number} ({plant.profile.name}), made {source.made_utc} by force-gateway {source.version}"
     if source.file:

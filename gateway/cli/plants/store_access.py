@@ -10,7 +10,7 @@ from gateway.cli.change_in_use import ask_until_done, not_running
 from gateway.cli.errors import CliError, NoAnswerError
 from gateway.cli.options import StateChoice
 from gateway.numbered_documents.store import StoredDocument, StoreError
-from gateway.plants.in_use import compensation_on, with_cell_terms
+from gateway.plants.in_use import compensation_on, own_plant, with_cell_terms
 from gateway.plants.store import FoundCause, NumberedPlant, PlantStore, Provenance, SourceRecording
 from gateway.processes import exit_codes
 from gateway.profiles import PlantProfile, ProfileError, Rig, load_plant, read_rig
@@ -39,8 +39,11 @@ def load_numbered(state: StateChoice, number: int) -> NumberedPlant:
     """Return a plant by its number, 0: the rig's own. CliError (65) when it is not there or damaged."""
     if number:
         return load_stored(open_store(state.directory), number)
-    nothing = Provenance(made_utc="", version="", rig=state.rig, start="")
-    return NumberedPlant(number=0, profile=find_plant(state, "0"), provenance=nothing)
+    rig = read_rig(state.rig)
+    own = own_plant(rig)
+    stands_in = own.name if rig.plant_profile is None else ""
+    nothing = Provenance(made_utc="", version="", rig=state.rig, start=stands_in)
+    return NumberedPlant(number=0, profile=own, provenance=nothing)
 
 
 def load_rig_or_none(state: StateChoice) -> Rig | None:
@@ -61,10 +64,7 @@ def find_plant(state: StateChoice, which: str) -> PlantProfile:
         return load_plant(which)
     if int(which):
         return load_stored(open_store(state.directory), int(which)).profile
-    rig = read_rig(state.rig)
-    if rig.plant_profile is None:
-        raise CliError(f"E433 rig {rig.name} names no plant of its own", exit_codes.DATA)
-    return rig.plant_profile
+    return own_plant(read_rig(state.rig))
 
 
 def add_file(state: StateChoice, file: Path) -> int:

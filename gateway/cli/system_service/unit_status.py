@@ -1,7 +1,7 @@
 """How a unit is, in one sentence, from what `systemctl show` says of it."""
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from gateway.cli.system_service.installation import run_command
 
@@ -19,6 +19,21 @@ class UnitStatus:
     def is_running(self) -> bool:
         """Decide whether it runs."""
         return self.properties.get("ActiveState") == "active"
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """The same for programs; properties that systemd has not told are empty."""
+        known = self.properties
+        return {
+            "unit": self.unit,
+            "running": self.is_running,
+            "state": known.get("ActiveState", ""),
+            "since": known.get("ActiveEnterTimestamp", ""),
+            "restarts": int(known.get("NRestarts") or 0),
+            "status": known.get("StatusText", ""),
+            "result": known.get("Result", ""),
+            "exit_code": int(known.get("ExecMainStatus") or 0),
+        }
 
     @property
     def sentence(self) -> str:

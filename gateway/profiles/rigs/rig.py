@@ -217,7 +217,13 @@ class Rig:
         return calibration.rig in (self.name, rehearsed(self.name) if self.simulated else self.name)
 
     def doubts_on(self, calibration: Calibration) -> str:
-        """Return why a calibration's forces are a guess on this real rig; empty where they are none."""
+        """Return why this rig takes no force of a calibration, or why they are a guess on this real one; else empty."""
+        most_n = self.control.limits.force_max_n
+        if calibration.force_limits_n and (lowest_n := calibration.force_limits_n[0]) > most_n:
+            own = (
+                f"calibration {calibration.number} is for {lowest_n:g} N and more, {self.name} for {most_n:g} N at most"
+            )
+            return f"{own} (limits.force_max_n): no setpoint but 0 is taken with it"
         if self.simulated or calibration.rig == self.name:
             return ""
         origin = f'was made on "{calibration.rig}", not on {self.name}'

@@ -66,11 +66,13 @@ class CommandBlock:
 
     def allow_force(self, limits_n: Sequence[float], source: str) -> None:
         """Accept from now on setpoints of 0 or limits_n (lowest, highest), whose they are is told by source; forces up to the
-        smaller of the rig's limit and theirs. Empty: the rig's alone."""
+        smaller of the rig's limit and theirs, of a lowest beyond the rig's limit none. Empty: the rig's alone."""
         rules = self._rules
         if limits_n:
             high_n = max(0.0, min(limits_n[-1], rules.force_max_n))
-            low_n = min(max(0.0, limits_n[0]), high_n)
+            low_n = max(0.0, limits_n[0])
+            if low_n > high_n:
+                low_n = high_n = 0.0  # no force is in both
             rules = replace(rules, setpoint_min_n=low_n, force_max_n=high_n, force_source=source)
         self.fields = self._fields(rules)
         self._last_words = (0, b"", [])

@@ -17,6 +17,7 @@ break. Rejected: a spare control process that waits (one restart only, and the f
 """
 
 import contextlib
+import errno
 import gc
 import json
 import os
@@ -41,6 +42,7 @@ _PARENT_POLL_S: Final = (
     0.0002  # how often a new child looks whether its first parent has ended, which takes microseconds
 )
 _ONE_THREAD: Final = "OPENBLAS_NUM_THREADS"  # a process with threads must not fork
+_WANTS: Final = (errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 _NAME_BYTES: Final = 15  # of a process's name, which top and ps -c show
 
 
@@ -107,13 +109,27 @@ def _fork(link: socket.socket, message: guardian_link.Message) -> None:
         if os.fork() == 0:
             link.close()
             code = _run_child(message, parent)
-    except BaseException:
-        traceback.print_exc()
+    except BaseException as error:
+        if want := tell_want(error):
+            sys.stderr.write(f"{want}\n")
+        else:
+            traceback.print_exc()
     finally:
         with contextlib.suppress(Exception):
             sys.stdout.flush()
             sys.stderr.flush()
         os._exit(code)
+
+
+def tell_want(error: BaseException) -> str:
+    """Return a sentence where a process could not begin for want of threads, files or memory; empty for any other error."""
+    is_want = isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in _WANTS)
+    limits = "raise what its limits allow (ulimit -a, LimitAS=, LimitNOFILE= or TasksMax= of a unit)"
+    return (
+        f"E106 it does not start ({getattr(error, 'strerror', None) or error or 'no memory'}): {limits}"
+        if is_want
+        else ""
+    )
 
 
 def _run_child(message: guardian_link.Message, parent: int) -> int:

@@ -128,7 +128,9 @@ class RigSupervisor:
         self._has_worked, self._answer = self._answer is not None, None
         if self._deaths > len(PAUSES_S):
             self._due_s, self._answer = inf, {"failed": True}
-            self._say(f"A409 the simulated rig ended {self._deaths} times ({how}): it stays off")
+            self._say(
+                f"A409 the simulated rig ended {self._deaths} times ({how}): it stays off; end the gateway and start it again"
+            )
             self._tell(self._answer)
             return
         pause_s = PAUSES_S[self._deaths - 1]

@@ -1,7 +1,7 @@
 """A connection to an MQTT broker that is opened again for ever, and carries what a session has to say."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import Any, Final
@@ -47,9 +47,11 @@ async def keep_connected(
     while True:
         will, queue = session.begin(), CommandQueue(session.is_stop, Standstill(), RoundTrips(loop.time))
         try:
-            async with _client(aiomqtt, broker, session.name, will, _queue_type(queue)) as client:
-                news.note_connected()
-                news.note_unheard(await _subscribe(client, session))
+            kind = _queue_type(queue, session.subscriptions)
+            async with _client(aiomqtt, broker, session.name, will, kind) as client:
+                unheard = await _subscribe(client, session)
+                news.note_connected()  # one that does not answer a subscription is no broker that is back
+                news.note_unheard(unheard)
                 await _carry(client, session, queue)
         except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
             first = _first(lost)
@@ -129,14 +131,16 @@ def _name_at_broker(name: str) -> str:
     return f"force-gateway {name}"
 
 
-def _queue_type(queue: CommandQueue) -> type[asyncio.Queue[Any]]:
+def _queue_type(queue: CommandQueue, topics: Sequence[str]) -> type[asyncio.Queue[Any]]:
     """Return the kind of queue that the library is to have for what it hears: one that hands all on at once. In its own, which
-    has no bound, the heartbeats of a publisher that had hung waited for minutes, and none of them was late."""
+    has no bound, the heartbeats of a publisher that had hung waited for minutes, and none of them was late. topics: those
+    that were asked for: what a broker brings of another one is somebody else's command."""
 
     class Handed(asyncio.Queue[Any]):
         def put_nowait(self, message: Any) -> None:
-            if not message.retain:  # of yesterday: a command that waits in the broker must never be carried out
-                queue.put(str(message.topic), bytes(message.payload or b""))
+            topic = str(message.topic)
+            if topic in topics and not message.retain:  # retained: of yesterday, which must never be carried out
+                queue.put(topic, bytes(message.payload or b""))
 
     return Handed
 

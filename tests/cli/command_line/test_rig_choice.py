@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 from gateway.cli import control_socket
@@ -81,7 +82,7 @@ def test_without_one_it_is_the_rig_that_runs_here(root: Path, monkeypatch: pytes
     assert state_directory(root, None) == root
 
 
-def test_one_that_stands_still_is_one_of_two(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_stands_still_is_one_of_two(root: Path, call, monkeypatch: pytest.MonkeyPatch) -> None:
     """While cell-a hung a ladder that was meant for it was climbed by cell-b, which alone answered: the one that runs."""
 
     def answer(state: Path, request: dict[str, Any]) -> dict[str, Any]:
@@ -94,7 +95,9 @@ def test_one_that_stands_still_is_one_of_two(root: Path, monkeypatch: pytest.Mon
         (root / name / CONTROL_SOCKET).touch()
     monkeypatch.setattr(control_socket, "ask", answer)
     assert known_rigs.running_rigs() == ["cell-a", "cell-b"]
-    assert state_directory(None, None) == root / "demo", "nobody knows which is meant"
+    with pytest.raises(click.UsageError, match=r"^cell-a and cell-b run here: --rig says which one is meant"):
+        state_directory(None, None)  # it was demo, of which nobody has spoken
+    assert call("events").stderr.startswith("Usage: ") and call("events", "--rig", "my-cell").exit_code == 0
     (root / "cell-a" / CONTROL_SOCKET).unlink()
     assert state_directory(None, None) == root / "cell-b"
 

@@ -3,6 +3,7 @@
 import json
 import socket
 import threading
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -181,6 +182,22 @@ def test_no_gateway_is_told_with_its_address(call) -> None:
         answer = call("read", "state", "--gateway", address)
     assert answer.exit_code == 69
     assert answer.stderr.startswith(f"E130 no gateway at {address}: Connection refused")
+
+
+def test_who_finds_no_gateway_is_told_of_those_that_run_on_other_ports(call, monkeypatch, tmp_path: Path) -> None:
+    """`run --bind :0` in one terminal, `hold 12` in another: "start one" was the answer, beside one that ran."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    said = {"cell-a": {"rig": "cell-a", "port": 40537}, "cell-b": {"rig": "cell-b", "port": None}}
+    for name in said:
+        (tmp_path / "force-gateway" / name).mkdir(parents=True)
+        (tmp_path / "force-gateway" / name / "control.sock").touch()
+    monkeypatch.setattr("gateway.cli.control_socket.ask", lambda state, request: said[state.name])
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        answer = call("read", "state", "--gateway", f"127.0.0.1:{taken.getsockname()[1]}")
+    assert answer.exit_code == 69
+    assert answer.stderr.endswith("or give --gateway HOST:PORT; here runs cell-a on port 40537\n")
+    assert "here run" not in call("read", "state", "--gateway", "robot.invalid:5020").stderr
 
 
 def test_a_host_that_does_not_exist_is_told(call, monkeypatch) -> None:

@@ -108,19 +108,31 @@ def test_only_a_gateway_of_this_machine_is_asked_for_its_words(tmp_path: Path) -
     assert is_asked(RtuWire("/dev/ttyS9", SerialSettings(baud=19200))), "the other end of a line is not known"
 
 
+def test_directories_of_another_user_are_passed_over(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A `write` that was refused ended with E105, of the folder, and without the reason."""
+
+    def refuse(*_: object) -> None:
+        raise PermissionError(13, "Permission denied", str(tmp_path))
+
+    monkeypatch.setattr(Path, "glob", refuse)
+    assert local_gateways.sockets_near(TcpWire("127.0.0.1", 5020), tmp_path) == []
+
+
 @pytest.mark.parametrize(
-    ("high_n", "said"),
+    ("low_n", "high_n", "said"),
     [
-        (50.0, "W204 force_setpoint = 65.00 N: allowed 0 .. 50 N by the calibration in use"),
-        (65.2, "W204 force_setpoint = 65.00 N: beyond the rig's own limit"),
-        (0.0, "W204 value out of range: exception 03"),
+        (0.0, 50.0, "W204 force_setpoint = 65.00 N: allowed 0 .. 50 N by the calibration in use"),
+        (1.0, 65.2, "W204 force_setpoint = 65.00 N: beyond the rig's own limit"),
+        (0.0, 0.0, "W204 value out of range: exception 03"),
+        (70.0, 80.0, "W204 force_setpoint = 65.00 N: the calibration in use is for 70 N and more; 0 is taken"),
     ],
 )
 def test_a_limit_that_only_registers_can_tell_is_told(
-    high_n: float, said: str, fake, call, monkeypatch, tmp_path: Path
+    low_n: float, high_n: float, said: str, fake, call, monkeypatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     fake.bank.refuse[1] = (3, RefusalReason.OUT_OF_RANGE)
+    fake.bank.set("force_low@active", low_n)
     fake.bank.set("force_high@active", high_n)
     answer = call("write", "force_setpoint=65", "--gateway", fake.address)
     assert answer.exit_code == 1

@@ -1,5 +1,6 @@
 """What the unit asks of the kernel for all processes of a gateway: their turns, and what follows where memory runs out."""
 
+import json
 import os
 import re
 import resource
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 from gateway import profiles
 from gateway.cli.errors import CliError
 from gateway.cli.main import command
-from gateway.cli.system_service import installation
+from gateway.cli.system_service import installation, unit_status
 from gateway.cli.system_service.installation import install_service, plan_installation
 from gateway.cli.system_service.unit_file import UnitOptions, unit_text
 from gateway.cli.system_service.unit_status import parse_status
@@ -171,6 +172,21 @@ def test_an_end_that_nobody_has_asked_systemd_for_starts_it_again() -> None:
     failure, and stayed off for good. What `systemctl stop` ends stays off with any setting."""
     assert setting("Restart", "no") == "always"
     assert str(exit_codes.OK) not in setting("RestartPreventExitStatus", "").split()
+
+
+@pytest.mark.parametrize("verb", ["install", "uninstall"])
+def test_a_mistyped_root_is_not_made(verb: str, tmp_path: Path) -> None:
+    done = CliRunner().invoke(command, ["service", verb, "demo", "--root", str(tmp_path / "imgae")])
+    assert done.exit_code == exit_codes.USAGE and "imgae is not there: mkdir -p makes a new one" in done.stderr
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_status_is_told_to_programs_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unit_status, "run_command", lambda words: "ActiveState=active\nNRestarts=1\n")
+    done = CliRunner().invoke(command, ["service", "status", "demo", "--json"])
+    (told,) = json.loads(done.stdout)
+    assert done.exit_code == exit_codes.OK
+    assert (told["unit"], told["running"], told["restarts"]) == ("force-gateway-demo.service", True, 1)
 
 
 @pytest.mark.parametrize("is_booted", [True, False])

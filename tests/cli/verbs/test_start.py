@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from gateway.cli import main
 from gateway.service.supervisor.guardian import RunOptions
@@ -54,6 +55,20 @@ def test_the_guardian_is_reached_without_numpy() -> None:
     imported = "sys, gateway.cli.verbs.operation.run, gateway.service.supervisor.guardian"
     code = f"import {imported}; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("diagnose", "1", "--json"), "--json OUT: - is stdout."),
+        (("calibration", "export", "1", "--yaml"), "--yaml PATH: YAML; - is stdout."),
+        (("diagnose", "1", "--closed-loop=3"), ""),
+    ],
+)
+def test_an_option_without_its_argument_says_what_belongs_there(words: tuple[str, ...], said: str) -> None:
+    done = CliRunner().invoke(main.command, words)
+    assert done.exit_code == 2
+    assert done.stderr.rstrip().endswith(said or "does not take a value.")
 
 
 def test_module_and_command_are_the_same() -> None:

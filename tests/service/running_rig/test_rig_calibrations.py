@@ -35,6 +35,12 @@ def test_of_one_that_was_chosen_it_says_which_and_what_is_doubtful(tmp_path: Pat
     assert "right-cell" in doubts
 
 
+def test_of_one_with_which_this_rig_takes_no_force_it_says_so(tmp_path: Path) -> None:
+    store = CalibrationStore(tmp_path, demo().calibration)
+    store.use(store.add(replace(demo().calibration, force_limits_n=(62.0, 65.0))), None)
+    assert "62 N and more, demo for 60 N at most" in RigCalibrations(demo(), tmp_path).notes[-1]
+
+
 def test_an_upload_is_stored_as_of_this_rig(tmp_path: Path) -> None:
     """So that nobody calls its forces a guess the next time."""
     calibrations = RigCalibrations(real(), tmp_path)

@@ -91,8 +91,8 @@ class Library:
         while True:
             yield self._queue.put_nowait(await self.heard.get())
 
-    def bring(self, payload: bytes, *, retain: bool) -> None:
-        self.heard.put_nowait(SimpleNamespace(topic="cell/command", payload=payload, retain=retain))
+    def bring(self, payload: bytes, *, retain: bool, topic: str = "cell/command") -> None:
+        self.heard.put_nowait(SimpleNamespace(topic=topic, payload=payload, retain=retain))
 
 
 Scene = Callable[[Session, Library, list[bytes]], Awaitable[None]]
@@ -227,20 +227,17 @@ def test_who_comes_later_is_told_by_the_broker_what_is_to_stay_there(monkeypatch
     play(monkeypatch, scene)
 
 
-class Told:
+class Told(Library):
     """The library, as far as it is told who connects; it never has a broker."""
-
-    MqttError = MqttError
 
     def __init__(self, *ends: Exception | None) -> None:
         self.ends = deque(ends)
         self.clients: list[dict[str, Any]] = []
 
-    def Will(self, topic: str, payload: bytes, qos: int, retain: bool) -> Any:  # noqa: N802
-        return topic, payload, qos, retain
+    def TLSParameters(self, *files: str | None, **more: Any) -> Any:  # noqa: N802
+        return (*files, *more.values())
 
-    def TLSParameters(self, *files: str | None) -> Any:  # noqa: N802
-        return files
+    Will = TLSParameters
 
     def Client(self, host: str, port: int, **more: Any) -> "Told":  # noqa: N802
         self.clients.append(more | {"host": host, "port": port})
@@ -252,9 +249,7 @@ class Told:
             raise end
         return self
 
-    async def __aexit__(self, *_: object) -> None: ...
-
-    async def subscribe(self, topic: str, qos: int) -> None:
+    async def publish(self, *words: Any, **more: Any) -> None:
         raise MqttError("broken pipe") if self.ends else asyncio.CancelledError
 
 
@@ -263,6 +258,7 @@ def connected(monkeypatch: pytest.MonkeyPatch, broker: Broker, library: Told) ->
     said = list[str]()
     monkeypatch.setattr(broker_connection, "import_library", lambda name: library)
     monkeypatch.setattr(broker_connection, "read_plain", lambda file: b"a key")
+    monkeypatch.setattr(Session, "announce", lambda self: (BrokerMessage("cell/online", b"true"),))
     with pytest.raises(asyncio.CancelledError):
         asyncio.run(keep_connected(broker, Session(), said.append, again_s=0.0))
     return said

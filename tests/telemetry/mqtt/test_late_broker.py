@@ -94,6 +94,18 @@ def test_an_enable_that_the_broker_has_held_up_is_told_and_not_carried_out(
     play(monkeypatch, scene)
 
 
+def test_what_nobody_has_asked_the_broker_for_is_not_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A broker that brought `{"force_setpoint": 12, "control_word": 1}` on any topic at all had the tool pressed."""
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        for topic in ("else", "cell", "cell/command/result", "cell/commandx", "other/cell/command", "cell/command"):
+            library.bring(topic.encode(), retain=False, topic=topic)
+        await turns()
+        assert session.answered == [b"cell/command"]
+
+    play(monkeypatch, scene)
+
+
 def test_nothing_waits_in_the_library_where_nobody_sees_how_old_it_is() -> None:
     """Its own queue has no bound: 60 000 heartbeats of a publisher that was gone waited there for five minutes."""
     aiomqtt = pytest.importorskip("aiomqtt")
@@ -102,7 +114,7 @@ def test_nothing_waits_in_the_library_where_nobody_sees_how_old_it_is() -> None:
 
     async def scene() -> None:
         queue = CommandQueue(lambda payload: payload == b"stop", Standstill(clock), RoundTrips(clock))
-        will, kind = BrokerMessage("cell/online", b"false"), broker_connection._queue_type(queue)
+        will, kind = BrokerMessage("cell/online", b"false"), broker_connection._queue_type(queue, ("cell/command",))
         client = broker_connection._client(aiomqtt, broker_connection.Broker("b", 1883), "cell", will, kind)
         for payload, retain in ((b"yesterday", True), *((b"%d" % number, False) for number in range(5000))):
             message = paho.MQTTMessage(topic=b"cell/command")

@@ -97,6 +97,37 @@ def test_a_topic_that_the_broker_does_not_let_us_hear_is_told() -> None:
     )
 
 
+@pytest.mark.usefixtures("impatient")
+def test_a_broker_that_answers_no_subscription_is_away_and_that_is_told_once() -> None:
+    """Every twelve seconds it was back, and away again, as long as it lasted."""
+
+    async def meet() -> list[str]:
+        said, met = list[str](), 0
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            nonlocal met
+            met += 1
+            await reader.read(1024)
+            writer.write(CONNACK)
+            while await reader.read(1024):
+                pass
+            writer.close()
+
+        server = await asyncio.start_server(serve, "127.0.0.1", 0)
+        host, port = server.sockets[0].getsockname()
+        keeping = asyncio.create_task(keep_connected(Broker(host, port), Session(), said.append, again_s=0.0))  # type: ignore[arg-type]
+        async with asyncio.timeout(20):
+            while met < 3:
+                await asyncio.sleep(0.05)
+        server.close()
+        keeping.cancel()
+        await asyncio.gather(keeping, return_exceptions=True)
+        return said
+
+    (sentence,) = asyncio.run(meet())
+    assert sentence.startswith("E181 the MQTT broker") and "is away" in sentence
+
+
 def first_word(broker: Broker) -> str:
     """What is said first of this broker."""
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import click
 
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.errors import CliError, already_exists
-from gateway.cli.options import StateChoice, count_of, state_options
+from gateway.cli.options import count_of, state_directory, state_option
 from gateway.plain_file import is_directory
 from gateway.processes import exit_codes, state_lock
 
@@ -19,8 +20,9 @@ EXAMPLES = ("restore kept.tar.gz --state elsewhere --dry-run", "restore kept.tar
 @click.argument("file", type=GivenPath(dir_okay=False, exists=True))
 @click.option("--force", is_flag=True, help="Also into a directory that is not empty; its content is kept beside it.")
 @click.option("--dry-run", is_flag=True, help="Check FILE and say what would be restored.")
-@state_options(makes=True)
-def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> None:
+@rig_option("The rig that is meant  [default: the one that was packed]", checks=False)
+@state_option("State directory of the gateway  [default: the rig's]", makes=True)
+def command(*, file: Path, force: bool, dry_run: bool, state: Path | None, rig: str | None) -> None:
     """Unpack a backup into a state directory.
 
     Wholly or not at all. The gateway must not be running.
@@ -28,9 +30,9 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
     from gateway.cli.state_archive import ArchiveError, names_in, unpack_state
     from gateway.processes.state_directory import put_back
 
-    directory = state.directory
     try:
         names = names_in(file)
+        directory = state or _place_of(file, rig)
         if not dry_run and (said := put_back(directory)):
             click.echo(said, err=True)
         if is_directory(directory) and any(directory.iterdir()) and not force:
@@ -46,6 +48,19 @@ def command(*, file: Path, force: bool, dry_run: bool, state: StateChoice) -> No
         f"restored {count_of(names, 'file')} to {directory}"
         + (f"; what was there is in {previous}" if previous else "")
     )
+
+
+def _place_of(file: Path, rig: str | None) -> Path:
+    """Return where the rig keeps its state. Of a rig that this machine does not know yet the backup is what there is: without
+    --rig it went to demo's."""
+    from gateway.cli.command_line.known_rigs import choose_rig
+    from gateway.cli.state_archive import rig_in
+    from gateway.service.supervisor.run_options import default_state_root
+
+    packed = rig_in(file)
+    if packed and rig in (None, packed):
+        return default_state_root() / packed
+    return state_directory(None, choose_rig(rig, None))
 
 
 @contextmanager

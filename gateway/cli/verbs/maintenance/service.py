@@ -1,5 +1,6 @@
 """`service`: a gateway that systemd keeps: install, uninstall, status, logs."""
 
+import json
 import os
 import shlex
 from pathlib import Path
@@ -9,11 +10,22 @@ import click
 
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
+from gateway.cli.options import json_option
+from gateway.plain_file import is_directory
 from gateway.processes import exit_codes
+
+
+def _existing_root(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
+    """Refuse one that is not there: by a slip of the pen a tree of an image came to be beside the image."""
+    if not is_directory(value):
+        raise click.BadParameter(f"{value} is not there: mkdir -p makes a new one")
+    return value
+
 
 _ROOT = click.option(
     "--root",
     type=GivenPath(file_okay=False),
+    callback=_existing_root,
     default=Path("/"),
     help="Write below this folder, and start nothing: for an image.",
 )
@@ -21,7 +33,7 @@ _ROOT = click.option(
 
 EXAMPLES = (
     "service install irc5-cell --dry-run --command /opt/force-gateway/bin/force-gateway",
-    "service install demo --root image --command /opt/force-gateway/bin/force-gateway",
+    "service install irc5-cell --dry-run --allow 192.168.125.0/24 --command /opt/force-gateway/bin/force-gateway",
 )
 
 
@@ -91,7 +103,8 @@ def uninstall_command(*, rig: str, root: Path) -> None:
 @command.command(name="status")
 @click.argument("rig", required=False)
 @_ROOT
-def status_command(*, rig: str | None, root: Path) -> None:
+@json_option
+def status_command(*, rig: str | None, root: Path, as_json: bool) -> None:
     """Show each service: whether it runs, since when, how often it was started again, what it says of itself.
 
     Exit code 1 when one of them does not run.
@@ -99,8 +112,10 @@ def status_command(*, rig: str | None, root: Path) -> None:
     from gateway.cli.system_service.unit_status import read_status
 
     found = [read_status(unit) for unit in _units_of(rig, root)]
-    for one in found:
-        click.echo(one.sentence)
+    if as_json:
+        click.echo(json.dumps([one.facts for one in found], indent=2))
+    else:
+        click.echo("\n".join(one.sentence for one in found))
     if not all(one.is_running for one in found):
         raise click.exceptions.Exit(exit_codes.FAILED)
 

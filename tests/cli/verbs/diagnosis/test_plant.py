@@ -16,6 +16,7 @@ from gateway.plants.force_reference import read_reference
 from gateway.plants.store import PlantStore
 from gateway.processes import exit_codes
 from gateway.processes.state_lock import hold_state_lock
+from gateway.profiles import shipped_profiles_folder
 from gateway.profiles.kinds.plant_writer import plant_text
 from gateway.recording import Recorder
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
@@ -130,6 +131,17 @@ def test_the_rigs_own_plant_is_shown_by_the_number_that_the_list_gives_it(state)
     assert "regulator:" in shown.stdout and "provenance" not in shown.stdout
     facts = json.loads(call(state, "show", 0, "--json").stdout)
     assert (facts["number"], facts["name"], facts["provenance"]) == (0, "paper-slide", None)
+
+
+def test_of_a_rig_that_names_no_plant_the_one_that_stands_in_is_shown(state, tmp_path):
+    """It was refused (E433), although `run --sim` simulates it and changes are compared with it."""
+    text = (shipped_profiles_folder() / "rigs" / "irc5-cell.yaml").read_text(encoding="utf-8")
+    rig = tmp_path / "bare.yaml"
+    rig.write_text(text.replace("plant: paper-slide", "#"), encoding="utf-8")
+    shown = call(state, "show", 0, "--rig", rig)
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    assert shown.stdout.startswith("plant 0 (paper-slide), stands in: the rig names none")
+    assert "same numbers" in call(state, "compare", 0, 0, "--rig", rig).stdout
 
 
 def test_compare_draws_both_plants_over_a_recording(added, tmp_path):

@@ -1,6 +1,7 @@
 """A forked child begins only when the guardian follows it: one that was given up must not become a second control."""
 
 import ctypes
+import errno
 import gc
 import json
 import os
@@ -213,3 +214,31 @@ def test_no_garbage_is_looked_for_until_all_is_read_and_then_in_what_is_new_only
     monkeypatch.setattr(gc, "freeze", lambda: frozen.append(gc.isenabled()))
     fork_server.prepare({})
     assert looked == [False, False, False] and frozen == [False] and gc.isenabled()
+
+
+@pytest.mark.parametrize(
+    ("error", "is_told"),
+    [
+        (BlockingIOError(errno.EAGAIN, "no thread for the log"), True),
+        (OSError(errno.EMFILE, "Too many open files"), True),
+        (MemoryError(), True),
+        (OSError(errno.EINVAL, "of our own making"), False),
+        (KeyError("ours"), False),
+    ],
+)
+def test_a_child_for_which_the_machine_has_too_little_says_so_and_any_other_end_is_traced(
+    error: Exception, is_told: bool, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Below `ulimit -v 150000` six tracebacks stood in the log of a start."""
+
+    def fail(*_: object) -> int:
+        raise error
+
+    monkeypatch.setattr(fork_server, "_run_child", fail)
+    theirs, ended = os.pipe()
+    fork_server._fork(SimpleNamespace(close=lambda: None), SimpleNamespace())  # type: ignore[arg-type]
+    os.close(ended)
+    assert os.read(theirs, 1) == b""  # as soon as the child, which has the other end too, has ended
+    os.close(theirs)
+    said = capfd.readouterr().err
+    assert said.startswith("E106 it does not start (") is is_told and ("Traceback" in said) is not is_told

@@ -145,6 +145,7 @@ def test_a_rig_that_keeps_dying_is_given_up_and_who_asks_is_told(rigs: Rigs) -> 
     rigs.one.ask(NOW_S)
     now_s = fails(rigs, NOW_S)
     assert rigs.said[-1].startswith("A409 the simulated rig ended 4 times")
+    assert rigs.said[-1].endswith("it stays off; end the gateway and start it again"), "no reset brings it back"
     rigs.one.ask(now_s + 1.0)
     assert rigs.told == [{"failed": True}] * 2
     assert (len(rigs.started), rigs.one.due_s) == (4, inf)
