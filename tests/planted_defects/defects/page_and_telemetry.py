@@ -124,4 +124,11 @@ DEFECTS = (
            ("web/test_secrets_and_frames.py",)),
     Defect("a page behind a proxy with a certificate commands nothing", "web/security.py",
            ", f\"https://{headers.get('host')}\")", ",)", ("web/test_guard.py",)),
+    Defect("a broker is told what was accepted as what was asked for", "telemetry/mqtt/json_topics.py",
+           "\"requested_n\": force.requested_n", "\"requested_n\": force.accepted_n", ("telemetry/mqtt/test_told_values.py",)),
+    Defect("of two forces in a command by MQTT the last one counts", "telemetry/mqtt/register_commands.py",
+           "            if register.address in words:  # by its name alone, and with its block\n",
+           "            if False:\n", ("telemetry/mqtt/test_told_values.py",)),
+    Defect("the page keeps a plant that nobody wants kept", "web/tabs/diagnosis_job.py",
+           "[\"--save\"] if job.keeps_plant else []", "[\"--save\"]", ("web/tabs/test_diagnosis_tab.py",)),
 )  # fmt: skip
