@@ -201,4 +201,10 @@ DEFECTS = (
            "other.rms_n + WORSE_SHARE * tolerance_n)",
            "other.rms_n + WORSE_SHARE)",
            ("service/fitting/test_acceptance.py",)),
+    Defect("the next process knows of no recording that was under way", "service/running_rig/recording/recordings.py",
+           "                self.on_wanted(self._wanted)\n            opened", "            opened",
+           ("service/running_rig/recording/test_recordings.py",)),
+    Defect("a defect of ours in the disk's thread is a disk that hangs", "service/running_rig/recording/run_recording.py",
+           "            try:\n                work()\n            finally:\n                self._taken += 1",
+           "            work()\n            self._taken += 1", ("service/running_rig/recording/test_run_recording.py",)),
 )  # fmt: skip
