@@ -209,9 +209,8 @@ def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) 
 def test_four_descriptors_arrive_and_of_more_all_are_closed_and_no_message(ends: Pair) -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
     message_link.send(ends[0], message_link.FORK, {}, *[0] * 4)
-    message = message_link.receive(ends[1])
-    assert message and len(message.descriptors) == 4
-    message.drop_descriptors()
+    four = message_link.receive(ends[1])
+    assert four and len(four.descriptors) == 4 and four.drop_descriptors() is None  # which closes them
     message_link.send(ends[0], message_link.LINE, {}, *[0] * 9)
     with pytest.raises(message_link.ProtocolError):
         message_link.receive(ends[1])
@@ -229,8 +228,7 @@ def test_no_call_waits(ends: Pair) -> None:
 def test_a_port_that_was_handed_over_is_no_inheritance_of_other_children(ends: Pair) -> None:
     message_link.send(ends[0], message_link.LINE, {}, ends[0].fileno())
     message = message_link.receive(ends[1])
-    assert message
-    assert not os.get_inheritable(message.descriptors[0])
+    assert message and not os.get_inheritable(message.descriptors[0])
     message.drop_descriptors()
 
 
