@@ -58,6 +58,7 @@ def test_a_start_asks_for_its_time_and_ready_takes_it_back(systemd: Heard) -> No
     manager.stopping()
     start, ready, stop = systemd.all()
     assert (start["WATCHDOG_USEC"], start["STATUS"]) == ("60000000", "control is started again: it died")
+    assert start["WATCHDOG"] == "1", "its time begins now"
     assert ready == {"READY": "1", "STATUS": "rig demo", "WATCHDOG_USEC": "10000000"}
     assert stop["STOPPING"] == "1"
 
