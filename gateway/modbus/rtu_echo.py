@@ -56,7 +56,7 @@ class RtuEcho:
         self._is_like_request = is_like_request
         self._sent_s, sent_out_s = now_s, now_s + len(answer) * self._character_s
         self._until_s, self._latest_s = sent_out_s + _ECHO_LATENCY_S, sent_out_s + _LATEST_ECHO_S
-        if is_like_request and self._has_echo is None:
+        if is_like_request:
             self._answers.append((answer, self._latest_s))
         self.frame = answer if not is_like_request or self._has_echo is not False else b""
 

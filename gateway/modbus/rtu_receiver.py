@@ -180,8 +180,7 @@ class RtuReceiver:
             at += size
         self.frames += len(found)
         self._passed += [request._replace(is_answered=False) for request in self._requests(found)]
-        while len(self._passed) > _MOST_PASSED or sum(len(request.pdu) for request in self._passed) > LONGEST_ADU:
-            del self._passed[0]
+        del self._passed[:-_MOST_PASSED]
         self._drop(at)
         if (surplus := len(self._burst) - LONGEST_ADU) > 0 and len(self._burst) > MOST_BYTES:
             self.noise_bytes += surplus

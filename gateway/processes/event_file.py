@@ -103,7 +103,7 @@ class EventReader:
             if fresh is None:
                 return
             self.close()
-            self._stream, self._rest = fresh, b""
+            self._stream = fresh
 
     def __enter__(self) -> Self:
         return self

@@ -5,6 +5,8 @@ import io
 import os
 import stat
 import tarfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ import pytest
 from gateway.cli import state_archive
 from gateway.cli.state_archive import ArchiveError, names_in, pack_state, unpack_state
 from gateway.processes.durable_file import lock_directory
+from gateway.processes.state_directory import place_of_restore
 
 
 def archive_of(path: Path, manifest: bytes, *names: str) -> Path:
@@ -63,6 +66,26 @@ def test_two_restores_at_once_mix_nothing(state: Path, tmp_path: Path, monkeypat
     with lock_directory(at_work), pytest.raises(OSError, match="locked"):
         unpack_state(tmp_path / "b.tar.gz", state)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([at_work.name, "b.tar.gz", state.name])
+
+
+def test_a_restore_whose_place_another_has_taken_before_it_held_it_leaves_it_alone(
+    state: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pack_state(state, tmp_path / "b.tar.gz")
+
+    @contextmanager
+    def lock_late(place: Path) -> Iterator[int]:
+        with lock_directory(place) as descriptor:
+            place.rmdir()  # by the other one, which has made it anew
+            place.mkdir()
+            (place / "state").mkdir()
+            yield descriptor
+
+    monkeypatch.setattr(state_archive, "lock_directory", lock_late)
+    with pytest.raises(OSError, match="another restore is at work"):
+        unpack_state(tmp_path / "b.tar.gz", state)
+    assert (place_of_restore(state) / "state").exists()
+    assert (state / "calibrations").is_dir()
 
 
 def test_what_is_restored_is_on_the_disk_before_it_is_the_state(

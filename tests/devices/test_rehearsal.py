@@ -81,22 +81,6 @@ PRESSURE = {"ask": "P?", "answer": "{p:d}", "range": {"device": [0, 10], "pressu
             {"set_voltage__answer": None, "read_voltage__range__voltage_v": [0, 5]},
             "the ranges do not fit",
         ),
-        (
-            {"read_voltage__range__voltage_v": [0, 5]},
-            "read_voltage.range.voltage_v: reads 0 .. 5 V, and set_voltage sets 0 .. 10 V: what is beyond is read as anot",
-        ),
-        ({"read_voltage__range__voltage_v": [1, 10]}, "reads 1 .. 10 V, and set_voltage sets 0 .. 10 V"),
-        ({"read_voltage__range__voltage_v": [-1, 9.95]}, None),
-        (
-            {"set_voltage__range__voltage_v": [0, 10000], "read_voltage": None},
-            "set_voltage.range.voltage_v: 10000 V: a voltage is in volts here, and an input of 10 V ends at 10",
-        ),
-        ({"set_voltage__range__voltage_v": [0, 24], "read_voltage__range__voltage_v": [0, 24]}, None),
-        (
-            {"read_pressure__range__pressure_pa": [0, 9]},
-            "read_pressure.range.pressure_pa: 9 Pa are 9e-05 bar: a pressure is in pascals here, and 1 bar is 100000",
-        ),
-        ({"read_pressure__range__pressure_pa": [-1e5, 1e3]}, None),
         ({"set_voltage__answer": "{counts:+.3E}"}, None),
         (
             {"set_voltage__ask": "SET {a:02X}{counts:d}", "constants": {"a": 300}},
@@ -126,6 +110,37 @@ def test_an_output_that_could_not_work_is_told(changes: dict[str, Any], told: st
     else:
         assert any(told in fault for fault in faults), faults
         assert all(":" in fault and fault.split(":")[1].isdecimal() for fault in faults), "file:line:column"
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            {"read_voltage__range__voltage_v": [0, 5]},
+            "read_voltage.range.voltage_v: reads 0 .. 5 V, and set_voltage sets 0 .. 10 V: what is beyond is read as anot",
+        ),
+        ({"read_voltage__range__voltage_v": [1, 10]}, "reads 1 .. 10 V, and set_voltage sets 0 .. 10 V"),
+        ({"read_voltage__range__voltage_v": [-1, 9.95]}, None),
+        ({"read_voltage__range__voltage_v": [-1, 9.8]}, "reads -1 .. 9.8 V, and set_voltage sets 0 .. 10 V"),
+        (
+            {"set_voltage__range__voltage_v": [0, 10000], "read_voltage": None},
+            "set_voltage.range.voltage_v: 10000 V: a voltage is in volts here, and an input of 10 V ends at 10",
+        ),
+        ({"set_voltage__range__voltage_v": [0, 101], "read_voltage": None}, "101 V: a voltage is in volts here"),
+        ({"set_voltage__range__voltage_v": [0, 24], "read_voltage__range__voltage_v": [0, 24]}, None),
+        (
+            {"read_pressure__range__pressure_pa": [0, 9]},
+            "read_pressure.range.pressure_pa: 9 Pa are 9e-05 bar: a pressure is in pascals here, and 1 bar is 100000",
+        ),
+        ({"read_pressure__range__pressure_pa": [0, 1900]}, "1900 Pa are 0.019 bar: a pressure is in pascals here"),
+        ({"read_pressure__range__pressure_pa": [-1e5, 1e3]}, None),
+    ],
+)
+def test_a_range_that_fits_no_other_or_no_unit_is_told(
+    changes: dict[str, Any], told: str | None, tmp_path: Path
+) -> None:
+    faults = loaded(tmp_path, "smc-itv-rc", **changes)
+    assert faults == [] if told is None else any(told in fault for fault in faults), faults
 
 
 @pytest.mark.parametrize(

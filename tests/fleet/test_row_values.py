@@ -12,8 +12,8 @@ from gateway.bsfm import Branches, RationalBezier
 from gateway.cli.fleet.files import cell_row, day_rows
 from gateway.cli.fleet.rows import Question, diagnose_row, fit_row
 from gateway.diagnosis import Diagnosis, Options
-from gateway.fleet.drift import _holm, find_drifts, undated
-from gateway.fleet.page import fleet_page
+from gateway.fleet.drift import CellDrift, _holm, find_drifts, undated
+from gateway.fleet.page import describe_drift, fleet_page
 from gateway.fleet.tasks import Task, find_tasks
 from tests.fleet.test_drift import row
 from tests.reports.fake_diagnosis import FRICTION, diagnosis
@@ -138,3 +138,8 @@ def test_a_day_is_its_median_and_its_trend_is_drawn_the_way_that_it_goes() -> No
         float(point.split(",")[1]) for point in re.findall(r"walk[^>]*(?:points|d)=.M?([^\"']+)", html)[0].split()
     ]
     assert heights[0] > heights[-1], "downwards is up"
+
+
+def test_a_drift_is_told_by_its_own_change_and_not_by_that_of_its_cause() -> None:
+    one = CellDrift("7", "2026-11-01", (0.0, 5.0), (0.1, 0.9), None, 0.82, True, "leak", 0.5, ("leak",), 0)
+    assert describe_drift(one) == "cell 7 (leak, +0.82 N in 5 days)"

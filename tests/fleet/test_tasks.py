@@ -36,3 +36,10 @@ def test_a_day_is_one_however_its_folder_spells_it(tmp_path: Path, written: str,
     folder.mkdir(parents=True)
     (folder / "press.csv").write_text("time_s\n")
     assert [(one.cell, one.date) for one in find_tasks([f"{folder}/*.csv"])] == [("7", date)]
+
+
+def test_a_link_that_leads_nowhere_is_a_recording_that_cannot_be_read_and_a_folder_is_none(tmp_path: Path) -> None:
+    """Of a store that is not mounted: its day would be missing without a word."""
+    (tmp_path / "gone.csv").symlink_to(tmp_path / "nowhere.csv")
+    (tmp_path / "folder.csv").mkdir()
+    assert [Path(one.path).name for one in find_tasks([f"{tmp_path}/*.csv"])] == ["gone.csv"]

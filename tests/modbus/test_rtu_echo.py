@@ -126,6 +126,14 @@ def test_no_enable_comes_back_behind_the_stop_that_a_master_has_written(latency_
     assert set(executed[first:]) == {stop} and len(executed) < 10
 
 
+def test_a_refusal_whose_echo_may_still_come_tells_nothing_of_the_line() -> None:
+    """Its adapter and this machine are slow: the line was taken for one without an echo, and what came back was answered, heard
+    and answered again without an end."""
+    enable, stop = P.write_register_request(0, 1), P.write_register_request(0, 0)
+    writes = [(0.05, enable), (0.14, enable), (0.19, stop), (0.28, stop)]
+    assert len(executed_on_an_echoing_line(0.06, writes)) < 10
+
+
 def test_an_echo_in_two_pieces_is_one() -> None:
     ones = b"\x03\x18" + 24 * b"\xff"  # none of which begins a frame by itself
     bus, answer = Bus(), encode_adu(1, ones)

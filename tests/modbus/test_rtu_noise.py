@@ -196,3 +196,10 @@ def test_of_requests_that_had_to_make_room_the_last_eight_are_carried_out() -> N
     receiver.receive(b"".join(encode_adu(1, request) for request in requests), 0.0)
     taken = receiver.take(1.0)
     assert [request.pdu for request in taken] == requests[-8:] and not any(request.is_answered for request in taken)
+
+
+def test_a_stop_to_everybody_is_carried_out_though_long_writes_have_to_make_room_behind_it() -> None:
+    """Nobody says a broadcast again."""
+    stop, long = P.write_register_request(0, 0), P.write_registers_request(200, bytes(200))
+    bus = Bus().send(encode_adu(0, stop) + 3 * encode_adu(1, long))
+    assert [request.pdu for request in bus.requests()] == [stop, long, long, long]

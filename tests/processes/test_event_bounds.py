@@ -115,6 +115,24 @@ def test_two_codes_within_a_second_are_no_flood_of_the_one_that_comes_last() -> 
     assert sum(line.endswith("by turns") for line in terminal.said()) == 1000
 
 
+def test_what_is_left_out_does_not_count_among_the_lines_of_a_long_flood() -> None:
+    """Hundreds in a second are a burst, and the next second has a line all the same."""
+    terminal = Terminal()
+    for second in range(4):
+        terminal.say(float(second), *["x"] * 700)
+    assert terminal.said().count("x") == 10 + 1 + 1 + 1
+
+
+def test_what_is_left_out_is_told_by_the_code_of_the_last_and_as_its_process_says_it(tmp_path: Path) -> None:
+    with EventLog(lambda line: None, Clock(), file=EventFile(tmp_path)) as log:
+        say = log.speaking_for("watch")
+        for code in ["W204"] * 10 + ["W201"] * 5:
+            say("refusal", f"{code} x")
+    with EventReader(tmp_path) as reader:
+        *_, told = reader.read_stored()
+    assert (told.code, told.source, told.text) == ("W201", "watch", "5 more lines of 'refusal' left out")
+
+
 def test_ten_lines_a_second_are_no_flood() -> None:
     terminal = Terminal()
     for second in range(5):
@@ -147,11 +165,11 @@ def read(reader: EventReader) -> list[str]:
 
 
 def test_who_does_not_hold_the_file_s_lock_gives_it_no_other_name(tmp_path: Path) -> None:
-    """Another process is at it; the file grows a little longer meanwhile."""
+    """Another process is at it, or reads: two that held it at once would give two names; the file grows longer meanwhile."""
     file = EventFile(tmp_path, longest_bytes=200)
     file.append(line("one"))
     holder = os.open(tmp_path / NAME, os.O_RDONLY)
-    fcntl.flock(holder, fcntl.LOCK_EX)
+    fcntl.flock(holder, fcntl.LOCK_SH)
     for _ in range(5):
         file.append(line("more"))
     assert [path.name for path in tmp_path.iterdir()] == [NAME]

@@ -77,7 +77,7 @@ def test_what_is_noted_is_not_on_the_terminal(tmp_path: Path) -> None:
 
 
 def test_a_line_for_people_moves_no_cursor_and_stays_one_event() -> None:
-    line = format_event(event("E150 one\ntwo \x1b[2J\r\x9b\u2028"))
+    line = format_event(event("E150 one\ntwo \x1b[2J\r\x9b\u2028\n"))
     assert line.endswith("E150 one\n    two \\x1b[2J\\x0d\\x9b\\x2028")
 
 
@@ -89,13 +89,15 @@ def torn_forms() -> Iterator[bytes]:
     whole = encode_event(event("W204 whole"))
     yield from (whole[:cut] for cut in range(len(whole) - 1))
     yield from (b"\x00" * 100, b"[" * 100_000, b'{"time": "x"}', b'{"time": "x", "severity": 1}', b"\xff\xfe", b"7")
+    for part in ("severity", "code"):  # a number in the place of a text
+        yield encode_event(event("W204 whole")._replace(**{part: 7})).rstrip()
 
 
 def test_whatever_a_killed_writer_leaves_costs_no_other_line(tmp_path: Path) -> None:
     """The next writer's line begins where the torn one ends."""
     for torn in torn_forms():
         path = tmp_path / "events.jsonl"
-        path.write_bytes(encode_event(event("one")) + torn + encode_event(event("two")) + torn)
+        path.write_bytes(encode_event(event("one")) + torn + encode_event(event("two")) + torn + b"\n")
         assert [found.text for found in kept(tmp_path)] == ["one", "two"], torn
 
 

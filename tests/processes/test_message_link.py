@@ -197,7 +197,7 @@ def test_a_guardian_that_does_not_read_does_not_stop_the_loop(ends: Pair) -> Non
     assert 0 < len(received) < 10_000, "the line was never full: this test shows nothing"
 
 
-@pytest.mark.parametrize("words", [b"r{", b"r[]", b"r3", b"r\xff", b"r" + b"x" * 70_000])
+@pytest.mark.parametrize("words", [b"r{", b"r[]", b"r3", b"r\xff", b"r" + b"[" * 50_000, b"r" + b"x" * 70_000])
 def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) -> None:
     ends[0].send(words)
     with pytest.raises(message_link.ProtocolError):
@@ -206,8 +206,11 @@ def test_what_is_no_message_is_told_apart_from_an_end(ends: Pair, words: bytes) 
     assert message_link.receive(ends[1]) == message_link.Message(message_link.HEARTBEAT), "the next one is whole again"
 
 
-def test_more_descriptors_than_are_taken_are_closed_and_no_message(ends: Pair) -> None:
+def test_four_descriptors_arrive_and_of_more_all_are_closed_and_no_message(ends: Pair) -> None:
     before = len(list(Path("/proc/self/fd").iterdir()))
+    message_link.send(ends[0], message_link.FORK, {}, *[0] * 4)
+    four = message_link.receive(ends[1])
+    assert four and len(four.descriptors) == 4 and four.drop_descriptors() is None  # which closes them
     message_link.send(ends[0], message_link.LINE, {}, *[0] * 9)
     with pytest.raises(message_link.ProtocolError):
         message_link.receive(ends[1])
@@ -225,8 +228,7 @@ def test_no_call_waits(ends: Pair) -> None:
 def test_a_port_that_was_handed_over_is_no_inheritance_of_other_children(ends: Pair) -> None:
     message_link.send(ends[0], message_link.LINE, {}, ends[0].fileno())
     message = message_link.receive(ends[1])
-    assert message
-    assert not os.get_inheritable(message.descriptors[0])
+    assert message and not os.get_inheritable(message.descriptors[0])
     message.drop_descriptors()
 
 

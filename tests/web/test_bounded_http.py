@@ -132,17 +132,22 @@ def test_who_opens_connections_and_asks_for_nothing_shuts_nobody_out() -> None:
             await loop.connect_accepted_socket(lambda: bounded_http.BoundedHttpProtocol(config, state, {}), ours)
             return await asyncio.open_connection(sock=far)
 
-        first = await connect()
         silent = [await connect() for _ in range(3 * most)]
         assert len(state.connections) < most
-        assert await first[0].read() == b"", "the one that was silent for longest has gone"
+        for each, _ in silent[: 1 - most]:
+            assert await each.read() == b"", "those that were silent for longest have gone"
         reader, writer = await connect()
         writer.write(WHOLE)
         assert b"here" in await reader.readuntil(b"here")
         writer.write(WHOLE)  # who asks stays, whoever comes behind
         more = [await connect() for _ in range(most - 2)]
+        for one, _ in tuple(more):
+            assert b"here" in await reader.readuntil(b"here")
+            more.append(await connect())
+            assert await one.read() == b"", "and not who has asked since"
+            writer.write(WHOLE)
         assert b"here" in await reader.readuntil(b"here")
-        for _, each in (first, *silent, (reader, writer), *more):
+        for _, each in (*silent, (reader, writer), *more):
             each.close()
         while state.connections:
             await asyncio.sleep(0)

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import time
 from collections.abc import AsyncGenerator, Iterator
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,18 @@ def put(ring: SampleRing, first: int, count: int) -> None:
 def read(event: bytes) -> tuple[str, Any]:
     head, _, data = event.decode().partition("\ndata: ")
     return head.removeprefix("event: "), json.loads(data) if data else None
+
+
+def test_a_state_says_when_it_was_told_by_the_clock_of_the_samples(tmp_path: Path) -> None:
+    """The page takes a force for old by it."""
+
+    async def scene() -> float:
+        source = EventSource(Context(tmp_path), None, Commands())  # type: ignore[arg-type]
+        await source._tell_state()
+        await source.close()
+        return float(read(source._state)[1]["clock_s"])
+
+    assert asyncio.run(scene()) == pytest.approx(time.monotonic(), abs=60.0)
 
 
 async def collect(source: EventSource, name: str, until: int) -> list[float]:

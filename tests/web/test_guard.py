@@ -60,6 +60,7 @@ def test_a_command_needs_the_token_of_its_own_session(app: Any) -> None:
     ("headers", "status"),
     [
         ({"origin": "http://127.0.0.1:8080"}, 200),
+        ({"origin": "https://127.0.0.1:8080"}, 200),  # behind a proxy with a certificate
         ({"origin": "http://evil.example"}, 403),
         ({"origin": "http://127.0.0.1:9999"}, 403),
         ({"origin": "null"}, 403),

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from gateway.live.control_link import ControlLink
+from gateway.processes.json_socket.connection import SocketLimits
 from gateway.processes.json_socket.server import JsonLineServer
 from gateway.web import context as web_context
 from gateway.web.context import WebContext
@@ -21,6 +22,7 @@ AS_OWNER = {"authorization": f"Bearer {TOKEN}"}
 
 def test_stop_still_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Control closes a way that has been idle for 30 s, and without the file there was no other."""
+    assert 0.5 * SocketLimits().idle_s >= web_context._KEPT_S
     monkeypatch.setattr(web_context, "_KEPT_S", 0.001)
     state, asked = tmp_path / "demo", asyncio.Queue[str]()
     state.mkdir()
@@ -39,6 +41,7 @@ def test_stop_still_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
         async with app.router.lifespan_context(app):
             for _ in range(6):  # both ways, again and again
                 await asked.get()
+            assert len(control._callers) == 2
             shutil.rmtree(state)
             stopped = await call(app, "POST", "/api/v1/command/stop", AS_OWNER)
         await control.close()

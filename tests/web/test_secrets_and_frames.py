@@ -45,6 +45,15 @@ def test_no_other_site_puts_a_frame_around_the_page(tmp_path: Path) -> None:
     assert headers["x-frame-options"] == "SAMEORIGIN"
 
 
+def test_a_report_is_without_a_script_and_in_a_sandbox(tmp_path: Path) -> None:
+    """What stands in it comes of recordings from anywhere; the page's own policy must not take the place of its own."""
+    (tmp_path / "diagnoses").mkdir()
+    (tmp_path / "diagnoses" / "0001.html").write_text("<p>a report</p>")
+    told = asyncio.run(call(page(tmp_path), "GET", "/api/v1/diagnosis/1/report"))
+    policy = told.headers["content-security-policy"]
+    assert told.status == 200 and policy.endswith("sandbox") and "script-src" not in policy
+
+
 def test_a_stop_of_a_calibration_is_never_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Told to ask again, a person beside a tool that climbs stairs would have pressed twice."""
     monkeypatch.setattr(Standstill, "is_aftermath", lambda standstill: True)

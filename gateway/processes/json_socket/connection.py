@@ -145,8 +145,6 @@ class JsonConnection:
     def _continue(self) -> None:
         if self._unread:
             self._server.enqueue(self._answer_next)
-        elif self._is_last:
-            self.close()
         else:
             self.listen()
 

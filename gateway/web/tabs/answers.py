@@ -26,7 +26,7 @@ BAD_REQUEST: Final = 400
 NOT_FOUND: Final = 404
 CONFLICT: Final = 409
 UNAVAILABLE: Final = 503
-_LARGEST_NUMBER: Final = 999_999
+_MOST_DIGITS: Final = 6
 REPORT_POLICY: Final = (
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; base-uri 'none'; sandbox"
 )
@@ -96,7 +96,7 @@ def number_in_query(request: Request, name: str) -> int:
 
 def number_of(text: str) -> int:
     """Return a plain decimal number. TabRefusedError for anything else."""
-    if not (text.isascii() and text.isdecimal() and int(text[:7]) <= _LARGEST_NUMBER and len(text) <= len("999999")):
+    if not (text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS):
         raise TabRefusedError(f"{text[:40]!r} is no number of the list", NOT_FOUND)
     return int(text)
 

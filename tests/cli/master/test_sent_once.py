@@ -57,6 +57,16 @@ def test_a_write_without_an_answer_is_one_write(deaf: DeafServer, call: Any, mon
     assert len(deaf.heard) == 15
 
 
+def test_of_what_never_went_out_nobody_is_told_that_it_may_be_in_effect(
+    call: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(GatewayClient, "check_map", lambda self: None)
+    with socket.create_server(("127.0.0.1", 0)) as gone:
+        port = gone.getsockname()[1]
+    done = call("write", "force_setpoint=12", "--gateway", f"127.0.0.1:{port}")
+    assert done.exit_code == 69 and "in effect" not in done.stderr
+
+
 def test_it_is_on_a_serial_line_too(call: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(wires, "TIMEOUT_S", 0.05)
     monkeypatch.setattr(GatewayClient, "check_map", lambda self: None)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.clients.gateway_at_hand import GatewayAtHand
+from tests.clients.gateway_at_hand import ECHO_AT, GatewayAtHand
 from tests.clients.programs.python_program import PythonProgram, SocketAtHand
 from tests.clients.scenes import MODEL, TEXTS, command, commands, cycles
 
@@ -155,3 +155,31 @@ def test_an_answer_that_comes_byte_by_byte_has_no_more_time_than_any(
     program.module["socket"].create_connection = lambda *_: Dripping()
     program.cycle(0.0)
     assert program.text.startswith("lost: ") and program.now_s <= program.client.timeout_s + 0.01
+
+
+def test_a_connection_that_came_about_begins_anew_with_its_proof_and_its_pauses(
+    program: PythonProgram, gateway: GatewayAtHand
+) -> None:
+    """A rig may want the proof of each connection, and a loss of hours ago is no reason to wait for longer."""
+    for losses in (3, 1):
+        gateway.is_cut = True
+        for _ in range(losses):
+            with pytest.raises(program.module["Lost"]):
+                program.client.exchange()
+            pause_s = program.client._retry_at_s - program.now_s
+            program.now_s += pause_s
+        gateway.is_cut = False
+        gateway.requests.clear()
+        program.client.enable(12.0)
+        cycles(program)
+        assert any(ECHO_AT in request for request in gateway.requests)
+        program.client.disable()
+        program.client.exchange()
+    assert pause_s == program.module["BACKOFF_FIRST_S"]
+
+
+def test_a_set_that_fails_as_a_whole_is_told_with_no_number_of_65535(program: PythonProgram) -> None:
+    program.client.write = lambda *_: None
+    program.client.read = lambda first, count: (4, 0xFFFF, 1)
+    with pytest.raises(program.module["Refused"], match="commit failed at number -1: "):
+        program.client.commit()

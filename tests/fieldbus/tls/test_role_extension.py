@@ -9,7 +9,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 
 from gateway.fieldbus.tls_settings import certificate_refusal
-from gateway.modbus.certificate import ROLE_OID, PeerCertificate, read_certificate
+from gateway.modbus.certificate import ROLE_OID, PeerCertificate, _common_name, read_certificate, read_certificates
 from tests.certificates import signed
 
 UNIX = datetime(1970, 1, 1, tzinfo=UTC)
@@ -84,3 +84,18 @@ def test_a_number_that_openssl_prints_with_a_zero_ahead_is_revoked_as_it_stands_
 @pytest.mark.parametrize("year", [1950, 1999, 2000, 2020, 2049])
 def test_a_year_of_two_digits_is_of_the_century_that_the_standard_says(year: int) -> None:
     assert shown_by(begins=datetime(year, 3, 1, tzinfo=UTC)).begins.startswith(f"{year}0301")
+
+
+def test_a_name_in_two_bytes_a_letter_is_read_as_it_stands() -> None:
+    """BMPString, as some tools write any name that is no ASCII: another name would own the setpoint."""
+    value = "Zelle Süd".encode("utf-16-be")
+    parts = bytes((0x06, 3)) + bytes.fromhex("550403") + bytes((0x1E, len(value))) + value
+    pair = bytes((0x30, len(parts))) + parts
+    assert _common_name(bytes((0x31, len(pair))) + pair) == "Zelle Süd"
+
+
+def test_what_is_no_certificate_is_told_and_notes_beside_one_are_passed_over() -> None:
+    for der in (b"", b"\x30", b"\x30\x82\x01", bytes(40)):
+        with pytest.raises(ValueError, match="not a certificate"):
+            read_certificate(der)
+    assert read_certificates("für Zelle 7".encode("latin-1")) == []

@@ -79,4 +79,10 @@ DEFECTS = (
            "    IF nBackoff>BACKOFF_LAST nBackoff:=BACKOFF_LAST;\n",
            "",
            ("clients/test_generated_clients.py",)),
+    Defect("a Python program proves its byte order on its first connection alone", "clients/templates/python.txt",
+           "            self.proven = self.known = False", "            self.known = False",
+           ("clients/one_language/test_ends_of_a_python_program.py",)),
+    Defect("a Python program's losses of hours ago keep it away for longer", "clients/templates/python.txt",
+           "        if self.known:\n            self._backoff_s = 0.0\n", "",
+           ("clients/one_language/test_ends_of_a_python_program.py",)),
 )  # fmt: skip

@@ -7,7 +7,14 @@ from typing import Any
 
 import pytest
 
-from gateway.processes.json_socket.messages import encode_answer, has_huge_number, refuse_constant, why_too_large
+from gateway.processes.json_socket.messages import (
+    encode_answer,
+    error_answer,
+    has_huge_number,
+    refuse_constant,
+    why_path_too_long,
+    why_too_large,
+)
 from gateway.processes.json_socket.server import JsonLineServer
 
 
@@ -65,3 +72,10 @@ def test_a_server_answers_a_huge_number_without_asking_its_handler(tmp_path: Pat
     assert isinstance(answer, bytes)
     assert b"more digits" in answer
     assert not asked
+
+
+def test_a_path_has_as_many_bytes_as_an_address_and_a_sentence_no_page() -> None:
+    assert why_path_too_long(Path("ä" * 53 + "x")) == ""
+    assert why_path_too_long(Path("ä" * 54)).startswith("108 bytes of path, a socket takes 107")
+    assert error_answer("x" * 500)["error"] == "x" * 500
+    assert error_answer("x" * 501)["error"] == "x" * 500 + " ..."

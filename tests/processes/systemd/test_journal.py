@@ -35,6 +35,12 @@ def test_an_event_has_its_code_its_severity_and_its_words() -> None:
     }
 
 
+def test_a_warning_is_one_of_the_journal_and_no_sentence_is_lost_for_its_letters() -> None:
+    """RFC 5424, table 2: notices are 5. A file's name need not be UTF-8."""
+    fields = read_fields(encode_fields(make_event(0.0, "control", "refusal", "W204 \udcff.yaml")))
+    assert (fields["PRIORITY"], fields["MESSAGE"]) == ("4", "W204 ?.yaml")
+
+
 @pytest.mark.parametrize("text", ["two\nlines=1\n", "PRIORITY=0\n=\n", "\n"])
 def test_no_sentence_can_bring_a_field_of_its_own(text: str) -> None:
     fields = read_fields(encode_fields(make_event(0.0, "control", "rate", text)))

@@ -1,8 +1,11 @@
 """What systemd hears: by a socket of our own in its place."""
 
+import os
 import socket
 from collections.abc import Iterator
+from math import inf
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -55,6 +58,7 @@ def test_a_start_asks_for_its_time_and_ready_takes_it_back(systemd: Heard) -> No
     manager.stopping()
     start, ready, stop = systemd.all()
     assert (start["WATCHDOG_USEC"], start["STATUS"]) == ("60000000", "control is started again: it died")
+    assert start["WATCHDOG"] == "1", "its time begins now"
     assert ready == {"READY": "1", "STATUS": "rig demo", "WATCHDOG_USEC": "10000000"}
     assert stop["STOPPING"] == "1"
 
@@ -79,6 +83,24 @@ def test_a_watchdog_that_is_meant_for_another_process_is_not_fed(systemd: Heard)
     )
     manager.feed(1.0)
     assert systemd.all() == []
+
+
+def test_a_watchdog_of_whoever_is_started_is_fed_and_one_of_no_time_is_none() -> None:
+    """WATCHDOG_PID is not everybody's who starts services (sd_watchdog_enabled(3))."""
+    assert take_service_manager({"WATCHDOG_USEC": "6000000"}, 42).feed_every_s == 2.0
+    assert take_service_manager({"WATCHDOG_USEC": "0"}, 42).feed_every_s == inf
+
+
+def test_a_manager_without_a_file_is_found_and_one_that_reads_nothing_is_not_waited_for() -> None:
+    """sd_notify(3): `@` is an abstract address. The guardian must not stand for it: nobody would write the safe voltage."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(f"\0force-gateway-test-{os.getpid()}")
+        manager = ServiceManager(f"@force-gateway-test-{os.getpid()}")
+        saying = Thread(target=lambda: [manager.stopping() for _ in range(600)], daemon=True)
+        saying.start()
+        saying.join(5.0)
+        assert not saying.is_alive()
+        assert b"STOPPING=1" in systemd.recv(4096, socket.MSG_DONTWAIT)
 
 
 def test_a_start_has_never_less_time_than_the_unit_gives(systemd: Heard) -> None:

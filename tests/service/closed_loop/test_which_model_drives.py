@@ -8,9 +8,12 @@ from typing import Any
 import pytest
 
 from gateway.control import NO_COMPENSATION
+from gateway.control.compensation.cell_map import CellMap
+from gateway.control.compensation.command_map import CommandMap
 from gateway.profiles import load_plant, load_rig
 from gateway.profiles.rigs.compensated_effects import CALIBRATE
 from gateway.service.closed_loop import study
+from gateway.service.closed_loop.identified_model import remove_compensated
 from gateway.service.closed_loop.simulated_run import ControlSetup, SimulatedRun
 from gateway.twin.plant import with_value
 
@@ -102,6 +105,15 @@ def test_a_model_that_is_the_same_needs_no_trial(monkeypatch: pytest.MonkeyPatch
     played.new = played.old
     gain = played.gain()
     assert [seed for _, seed, _ in played.runs] == [3, 4, 3, 4] and gain.compensated == ("friction",)
+
+
+def test_of_what_control_compensates_the_model_knows_nothing() -> None:
+    """It would be made good twice."""
+    bent = with_value(with_value(EXTENDED, "regulator", "command_bow", 0.05), "regulator", "command_s", 0.02)
+    bent = with_value(bent, "cell", "crosstalk_n_per_v", 0.1)
+    cell, command = CellMap(crosstalk_n_per_v=0.1), CommandMap(bow=0.05, s=0.02)
+    assert remove_compensated(bent, NO_COMPENSATION) == bent
+    assert remove_compensated(bent, replace(NO_COMPENSATION, cell=cell, command=command)) == EXTENDED
 
 
 def test_nothing_to_know_is_run_once(monkeypatch: pytest.MonkeyPatch) -> None:

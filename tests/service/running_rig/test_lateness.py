@@ -18,6 +18,7 @@ from gateway.devices.force_reading import ForceReading
 from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.processes.scheduling.withheld_time import WithheldTime
 from gateway.service.running_rig.lateness import Lateness
+from gateway.service.running_rig.running_rig import RunningRig
 from tests.service.rigs import demo
 from tests.service.wired import Wired
 
@@ -175,3 +176,19 @@ def test_only_a_cell_that_streams_leads_the_tick() -> None:
     asked = Wired(replace(demo(), load_cell=replace(demo().load_cell, device=polled, unit=None)))
     asked.until(lambda: asked.loop.sample is not None, 2.0)
     assert asked.loop.streamed_s is None
+
+
+def test_behind_a_restart_of_the_simulated_rig_the_turns_of_the_new_process_are_counted(tmp_path: Path) -> None:
+    """Else a rig that stands still is a wire that is cut."""
+    kernel, moved = Kernel(tmp_path), list[dict[str, str]]()
+    rig = object.__new__(RunningRig)
+    rig.__dict__ |= {
+        "_guardian": SimpleNamespace(rig_pid=os.getpid()),
+        "_lateness": kernel.lateness,
+        "_ports": SimpleNamespace(move=moved.append),
+    }
+    before = kernel.lateness._rig
+    rig.move_ports({"output": "/dev/pts/9"})
+    assert moved == [{"output": "/dev/pts/9"}]
+    assert kernel.lateness._rig not in (None, before)
+    kernel.lateness.close()

@@ -30,6 +30,11 @@ def test_another_cell_behind_the_port_stops_a_force_and_is_asked_again_by_a_rese
     identity.fault, identity.said = FaultCode.WRONG_DEVICE, "KERN 1.2"
     wired.loop.output._unread = "the output's last answer could not be read"
     assert wired.loop._line(wired.now_s).said == "KERN 1.2", "whose fault it is"
+    output = wired.loop.output.checks
+    output.fault, output.said = FaultCode.OUTPUT_REFUSED, "ITV 3"
+    line = wired.loop._line(wired.now_s)
+    assert (line.fault, line.said) == (output.fault, output.said), "of two faults one with its own words"
+    output.fault, output.said = FaultCode.NONE, ""
     assert wired.voltage_reaches_safe(0.1) <= 0.1
     assert wired.fault_code is FaultCode.WRONG_DEVICE
     assert any("KERN 1.2" in sentence for sentence in wired.said("A"))

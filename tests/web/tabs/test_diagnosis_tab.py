@@ -1,6 +1,7 @@
 """A diagnosis of the page: one at a time, cancelled without a trace, and ended with the page's process."""
 
 import asyncio
+import errno
 import json
 import re
 import socket
@@ -143,3 +144,31 @@ def test_the_disk_that_takes_the_report_keeps_no_request_waiting(tmp_path, monke
     asyncio.run(jobs._end(job, 0, "", tmp_path))
     assert (job.ended, job.took_s) == ("done", 2.0)
     assert names and names != [threading.main_thread().name]
+
+
+@pytest.mark.parametrize("keeps_plant", [False, True])
+def test_a_plant_is_kept_where_that_is_wanted_and_a_process_that_does_not_start_leaves_nothing_open(
+    tmp_path, monkeypatch, keeps_plant: bool
+) -> None:
+    words: list[str] = []
+
+    async def refuse(*asked: str, **_: object) -> None:
+        words.extend(asked)
+        raise OSError(errno.ENOMEM, "no memory")
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", refuse)
+    link, far_end = socket.socketpair()
+    monkeypatch.setattr(diagnosis_job, "socket", SimpleNamespace(socketpair=lambda: (link, far_end)))
+    jobs = diagnosis_job.DiagnosisJobs(SimpleNamespace(state=tmp_path), lambda: 2.0)
+    asyncio.run(jobs.begin(1, keeps_plant=keeps_plant))
+    assert ("--save" in words) is keeps_plant
+    assert (jobs.status()["ended"], jobs.status()["said"]) == ("failed", "the diagnosis did not start: no memory")
+    assert link.fileno() == far_end.fileno() == -1
+
+
+def test_the_reports_are_those_that_are_whole_the_newest_recording_first(tmp_path) -> None:
+    (tmp_path / "diagnoses").mkdir()
+    for name in ("0001.json", "0001.html", "0002.json", "0010.json", "0010.html"):
+        (tmp_path / "diagnoses" / name).write_text('{"verdict": "agrees", "causes": []}')
+    kept = diagnosis_job.kept_diagnoses(tmp_path)
+    assert [(one["recording"], one["verdict"]) for one in kept] == [(10, "agrees"), (1, "agrees")]

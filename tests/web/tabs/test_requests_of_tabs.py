@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from gateway.web.tabs.own_command import last_sentence
 from tests.web.tabs.conftest import record
 
 COMMANDS = (
@@ -91,3 +92,8 @@ def test_without_a_gateway_a_tab_says_so_and_the_lists_still_work(page, state) -
     assert page.get("/api/v1/calibrate").status == 503
     assert "does not answer" in page.post("/api/v1/recordings/start").json["error"]
     assert [one["number"] for one in page.get("/api/v1/recordings").json["recordings"]] == [1]
+
+
+def test_what_a_verb_refuses_is_its_last_sentence_without_the_prefix_of_a_terminal() -> None:
+    assert last_sentence("Usage: x\n\nError: E177 a run is under way\n \n") == "E177 a run is under way"
+    assert last_sentence("\n") == ""

@@ -67,6 +67,7 @@ def test_a_recording_with_a_time_ends_by_the_loops_clock(recordings: Recordings)
     wanted: list[WantedRecording | None] = []
     recordings.on_wanted = wanted.append
     recordings.start(for_s=2.0)
+    assert [one and one.began_in.endswith("0001.fgr") for one in wanted] == [True], "or the next process knew of none"
     recordings.flush(100.0)
     recordings.flush(101.99)
     assert recordings.status()["recording"] and wanted[-1]

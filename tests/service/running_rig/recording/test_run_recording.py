@@ -4,6 +4,7 @@ import asyncio
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -269,3 +270,22 @@ def test_a_recording_that_ends_before_its_first_tick_is_not_blamed_on_the_disk(
         recordings.flush(400_000.0 + tick / 100)
     disk.let_go()
     assert "fault" not in stopped.result(0) and not log
+
+
+def test_a_defect_of_ours_in_the_disk_s_thread_is_no_disk_that_hangs(
+    tmp_path: Path, disk: HangingDisk, log: Log
+) -> None:
+    def fail() -> None:
+        raise ZeroDivisionError
+
+    file = SimpleNamespace(
+        path=tmp_path / "0001.fgr", failure=None, rows_written=0, append=lambda row: None, write=fail
+    )
+    recording = RunRecording(disk, disk, lambda: file, log)  # type: ignore[arg-type, return-value]
+    recording.begin(lambda error: None)
+    disk.let_go()
+    rows_until(recording, 0.0)
+    with pytest.raises(ZeroDivisionError):
+        disk.let_go()
+    recording.flush(HANGS_S + 5.0)
+    assert recording.failure is None
