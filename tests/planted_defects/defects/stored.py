@@ -212,5 +212,5 @@ DEFECTS = (
            "            await asyncio.wait([asyncio.wrap_future(closed)], timeout=END_BOUND_S)", "            pass",
            ("service/running_rig/runs/test_end_beside_a_run.py",)),
     Defect("of a store that is not mounted a fleet's days are missing without a word", "fleet/tasks.py",
-           "if Path(path).is_file() or not Path(path).exists()]", "if Path(path).is_file()]", ("fleet/test_tasks.py",)),
+           "if is_file(path) or not exists(path)]", "if is_file(path)]", ("fleet/test_tasks.py",)),
 )  # fmt: skip
