@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 
 TOLD = WarningBit.TARGET_UNREACHABLE | WarningBit.TRIM_SATURATED | WarningBit.FORCE_UNSTEADY
 LONG_S = 3.0
-MOST_OFTEN = (
-    FREE_SWINGS  # that an alarm comes while nobody changes anything: a trim may reach its limit in each of them
-)
+MOST_OFTEN = FREE_SWINGS
+"""That an alarm comes while nobody changes anything: a trim may reach its limit in each of them."""
 
 
 class Judge(OutputLaws):
@@ -104,8 +103,6 @@ class Judge(OutputLaws):
             or force_n > 55.0 * self.scale + self.direction * self.told_weight_n
             or not rig.machine.touches
         ):
-            return False
-        if force_n > 55.0 * self.scale + self.direction * self.told_weight_n:
             return False
         least_v, most_v = self.volts(force_n)
         low_v, high_v = most_v - 0.6 * trim.limit_v, least_v + 0.6 * trim.limit_v
