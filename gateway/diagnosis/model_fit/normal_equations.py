@@ -162,5 +162,5 @@ def covariance(fitted: FittedModel, whiten: Whitener) -> Floats:
     columns = whiten.spectra(fitted.jacobian)
     scale = np.sqrt(np.maximum(np.sum(columns**2, axis=1), 1.0e-300))
     normal_matrix = (columns @ columns.T) / np.outer(scale, scale)
-    scaled: Floats = np.linalg.pinv(normal_matrix, rcond=1.0e-10)
-    return scaled / np.outer(scale, scale)
+    inverse: Floats = np.linalg.pinv(normal_matrix, rcond=1.0e-10) / np.outer(scale, scale)
+    return inverse
