@@ -14,6 +14,8 @@ letter, and to answer one's own echo would never end. Decisions:
 - A write that equals an earlier answer than the last is in doubt at once: two echoes that follow each other would go round, and
   an enable come back behind each stop. Nobody waits for a refusal of an echo, so a master may speak before that comes back:
   what is heard while that may still come tells that there is none the third time only.
+- Of a master that waits for no answer several are on their way: on a line that has an echo each of them is one when it comes
+  back. A stop that equals one is rather that master's own, and those before it may still come.
 - On a line that has an echo, or may have one, what is asked before it comes back was asked by a master that had given up. It is
   executed and not answered, and the echo behind it is one: an enable that came back behind a stop would undo that.
 """
@@ -65,6 +67,8 @@ class RtuEcho:
         if self._refusal and frame == self._refusal != self.frame:
             self._has_echo, self._refusal = True, b""  # behind an answer to a master who has not waited for it
             return True
+        if self._has_echo and self._is_owed(frame, heard_s):
+            return True
         if not self.frame or frame != self.frame:
             return False
         if not self._is_like_request:
@@ -74,6 +78,22 @@ class RtuEcho:
         self.frame = b""
         return True
 
+    def _is_owed(self, frame: bytes, heard_s: float) -> bool:
+        """Decide whether a frame is an earlier answer, too, which a line that has an echo owes: of a master that has not waited
+        several are under way."""
+        place = self._place_of(frame, heard_s)
+        if place is None:
+            return False
+        del self._answers[place]
+        if frame == self.frame:
+            self.frame = b""
+        return True
+
+    def _place_of(self, frame: bytes, heard_s: float) -> int | None:
+        """Where an equal answer that may still come stands among those that may."""
+        self._answers = [one for one in self._answers if heard_s <= one[1]]
+        return next((k for k, (answer, _) in enumerate(self._answers) if answer == frame), None)
+
     def _heard_out_s(self, size: int) -> float:
         """The earliest that a request of so many bytes can be there, of a master that has listened to the answer."""
         return self._sent_s + (len(self.frame) + size) * self._character_s
@@ -81,15 +101,16 @@ class RtuEcho:
     def is_in_doubt(self, frame: bytes, heard_s: float) -> bool:
         """Decide whether a frame that is_this has let through may be an answer of ours all the same, while no answer of another
         kind has shown yet what the line does. Those before it have come back as well then, or never do."""
-        self._answers = [one for one in self._answers if heard_s <= one[1]]
-        place = next((k for k, (answer, _) in enumerate(self._answers) if answer == frame), None)
+        place = self._place_of(frame, heard_s)
         if self._has_echo is not None or place is None:
             self._repeats = 0
             return False
-        del self._answers[: place + 1]
+        is_stop, later = frame[-4:-2] == _NOTHING_SET, self._answers[place + 1 :]
+        earlier = self._answers[:place] if is_stop else []  # which is never refused: it may be a master's own
+        self._answers = [*earlier, *later]
         self._repeats += 1
-        if self._answers:  # something else was answered since: an echo on its second round, or a stop
-            return frame[-4:-2] != _NOTHING_SET
+        if later:  # something else was answered since: an echo on its second round, or a stop
+            return not is_stop
         return self._is_refusal_out or self._repeats > _QUICK_REPEATS
 
     @property
@@ -115,7 +136,8 @@ class RtuEcho:
             return
         if self.frame and not self._is_like_request:
             self._unreturned += self._is_refusal_out
-            if not self._is_refusal_out or heard_s > self._latest_s or self._unreturned == _MOST_UNRETURNED:
+            is_patient = self._is_refusal_out or self._has_echo  # it may come late, as one has come
+            if not is_patient or heard_s > self._latest_s or self._unreturned == _MOST_UNRETURNED:
                 self._has_echo = False
         self.frame = b""
 

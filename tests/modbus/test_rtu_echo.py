@@ -134,6 +134,25 @@ def test_a_refusal_whose_echo_may_still_come_tells_nothing_of_the_line() -> None
     assert len(executed_on_an_echoing_line(0.06, writes)) < 10
 
 
+@pytest.mark.parametrize(
+    ("latency_s", "writes"),
+    [
+        (0.016, [(35, 0), (55, 1), (75, 0), (185, 0)]),  # its own stop was taken for the echo of the one before
+        (
+            0.06,
+            [(150, 1), (170, 1), (260, 1), (310, 1), (360, 1), (460, 0)],
+        ),  # two answers on their way, on a known line
+        (0.03, [(50, 0), (160, 1), (210, 0), (240, 0), (270, 1), (360, 1), (380, 1), (420, 0)]),  # one late, once
+    ],
+)
+def test_echoes_of_a_master_that_waits_for_no_answer_end(latency_s: float, writes: list[tuple[int, int]]) -> None:
+    """Enables came back behind its last stop, without an end."""
+    given = [(at_ms / 1e3, P.write_register_request(0, word)) for at_ms, word in writes]
+    executed = executed_on_an_echoing_line(latency_s, given)
+    assert len(executed) < 3 * len(writes)
+    assert not executed[-1].endswith(b"\x01")
+
+
 def test_an_echo_in_two_pieces_is_one() -> None:
     ones = b"\x03\x18" + 24 * b"\xff"  # none of which begins a frame by itself
     bus, answer = Bus(), encode_adu(1, ones)
