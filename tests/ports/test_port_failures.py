@@ -17,6 +17,8 @@ from gateway.devices import SerialSettings
 from gateway.ports import PortError, PortEvents, Pty, SerialPort
 from gateway.ports.errors import explain_loss, explain_open_failure
 
+root_only = pytest.mark.skipif(os.geteuid() != 0, reason="only root can give a port to another group")
+
 
 async def told_by_opening(ear: Any, path: str) -> PortError:
     with pytest.raises(PortError) as told:
@@ -45,6 +47,7 @@ def anna(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gateway.ports.errors.grp.getgrnam", lambda name: grp.struct_group(("dialout", "", 20, [])))
 
 
+@root_only
 def test_no_permission_names_the_group_the_user_and_the_command(
     ear: Any, line: Pty, anna: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -58,6 +61,7 @@ def test_no_permission_names_the_group_the_user_and_the_command(
     )
 
 
+@root_only
 def test_a_member_who_has_not_logged_in_again_is_told_so(
     line: Pty, anna: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -70,6 +74,7 @@ def test_a_member_who_has_not_logged_in_again_is_told_so(
     assert "usermod" not in str(explain_open_failure(line.path, PermissionError(errno.EACCES, ""), []))
 
 
+@root_only
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o620])
 def test_a_port_for_root_alone_needs_a_group_first(line: Pty, anna: None, mode: int) -> None:
     """Or of which its group may do half: to be in that one helps nobody."""
