@@ -157,7 +157,9 @@ class CellScene:
         if not sent:
             self.complain(f"a reading of {sample.force_n:.3f} N was never sent")
         elif sample.time_s < min(min(sent) - STALL_S, self.stalled_since_s - 0.06):
-            self.complain("a reading is older than the cell's word, and than the standstill that it may have waited for")
+            self.complain(
+                "a reading is older than the cell's word, and than the standstill that it may have waited for"
+            )
 
     def _is_first(self) -> bool:
         """Of an open number the first sentence behind an opening may be the rest of one."""
