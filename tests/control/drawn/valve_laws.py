@@ -42,7 +42,7 @@ class ValveLaws:
             self.pressed_s = now_s
             if 0.0 <= now_s - rig.moved_s < valve.dwell_s - 1e-9:
                 self.judge.complain(f"{output.voltage_v:.2f} V {now_s - rig.moved_s:.3f} s behind the valve's readback")
-        if output.valve not in (None, rig.told) and now_s - self.pressed_s < valve.dwell_s - 1e-9:
+        if rig.told_s == now_s and now_s - self.pressed_s < valve.dwell_s - 1e-9:  # told in this step
             self.judge.complain(f"the valve is told {now_s - self.pressed_s:.3f} s behind a voltage")
         is_switching = bool(output.status & StatusBit.SWITCHING)
         if output.force_applied_n < 0.0 or output.force_accepted_n < 0.0 or output.force_requested_n < 0.0:

@@ -38,6 +38,7 @@ class CellScene:
         self.exchange = CellExchange(self.host, self._write, self.profile, STALL_S)
         self.wire.on_device, self.wire.on_host = self._reach_device, self._hear
         self.is_open, self.dark_until_s, self.stalled_until_s, self.slow_until_s = True, -inf, -inf, -inf
+        self.stalled_since_s = inf
         self.waiting: list[tuple[float, bytes]] = []
         self.sent: list[tuple[float, float]] = []  # when, N
         self.samples: list[tuple[float, ForceSample]] = []
@@ -117,6 +118,7 @@ class CellScene:
             case "power":
                 self.dark_until_s = now_s + length_s
             case "stall":
+                self.stalled_since_s = min(now_s, self.stalled_since_s) if now_s < self.stalled_until_s else now_s
                 self.stalled_until_s = now_s + length_s
             case "slow":
                 self.slow_until_s = now_s + length_s
@@ -154,8 +156,10 @@ class CellScene:
             return
         if not sent:
             self.complain(f"a reading of {sample.force_n:.3f} N was never sent")
-        elif sample.time_s < min(sent) - STALL_S and now_s < self.stalled_until_s:
-            self.complain("a reading is older than the cell's word")
+        elif sample.time_s < min(min(sent) - STALL_S, self.stalled_since_s - 0.06):
+            self.complain(
+                "a reading is older than the cell's word, and than the standstill that it may have waited for"
+            )
 
     def _is_first(self) -> bool:
         """Of an open number the first sentence behind an opening may be the rest of one."""
