@@ -51,14 +51,6 @@ def test_a_register_that_does_not_say_what_is_is_seen(observer: Observer, law: s
     assert observer.broken and all(line.startswith(law) for line in observer.broken)
 
 
-@pytest.mark.parametrize("word", [16, 1])
-def test_a_status_bit_that_the_state_does_not_have_is_seen(observer: Observer, word: int) -> None:
-    witness = StatusWitness(observer, lambda: 1.0)
-    for tenths in range(13, 21):
-        look(witness, 0.1 * tenths, status_word=word)
-    assert any(line.endswith(f"status word {word:#x} in state 0") for line in observer.broken), observer.broken
-
-
 @pytest.mark.parametrize(
     ("sentences", "is_over"),
     [
