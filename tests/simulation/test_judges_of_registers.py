@@ -166,3 +166,12 @@ def test_a_reading_may_be_dated_behind_the_standstill_that_it_waited_through(awo
         words[12], words[16] = 100 * (tenths - 10) - 150, 0x0A00
         witness.note(struct.pack(f">{STATUS_WORDS}H", *words), 0.1 * tenths)
     assert bool(observer.broken) is is_seen
+
+
+@pytest.mark.parametrize("word", [16, 1])
+def test_a_status_bit_that_the_state_does_not_have_is_seen(word: int) -> None:
+    observer = Observer(BOUNDS)
+    witness = StatusWitness(observer, lambda: 1.0)
+    for tenths in range(13, 21):
+        witness.note(struct.pack(f">{STATUS_WORDS}H", word, *[0] * (STATUS_WORDS - 1)), 0.1 * tenths)
+    assert any(line.endswith(f"status word {word:#x} in state 0") for line in observer.broken), observer.broken

@@ -5,7 +5,7 @@ from math import inf, pi, radians, sin
 from random import Random
 
 from gateway.control import Output
-from gateway.registers.words import ControlBit, Mode, State, StatusBit
+from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.drawn.judge import Judge
 from tests.control.drawn.rig import DrawnRig, draw_response
 
@@ -186,7 +186,12 @@ class Scene:
         before = self.rig.last
         self._write("changes", **changes)
         after, held = self.rig.last, StatusBit.IN_BAND | StatusBit.ENABLED
-        if before.status & after.status & held == held and abs(after.voltage_v - before.voltage_v) > BUMP_V:
+        is_rising = before.limited_by is LimitedBy.VOLTAGE_SLEW  # for what was asked for before
+        if (
+            before.status & after.status & held == held
+            and not is_rising
+            and abs(after.voltage_v - before.voltage_v) > BUMP_V
+        ):
             self.judge.complain(f"{before.voltage_v:.3f} V become {after.voltage_v:.3f} V by {changes}")
 
     def _sine(self) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.simulation.judges.heard import LineObserver, RtuObserver, crc16
 from tests.simulation.judges.observer import DOWN_S, FAULT, GRACE_S, STATUS_WORDS, Bounds, Observer
 
 BOUNDS = Bounds(8.5, 40.0, 0.125, 0.1, 0.2, 0.01, output_timeout_s=0.25, reply_timeout_s=0.05)
@@ -171,3 +172,25 @@ def test_an_over_force_that_its_cell_says_is_counted_in_the_unit_of_its_frame(
     hear_all(observer, PRESSES_S + 0.1)
     observer.look(PRESSES_S + 0.1)
     assert broken_laws(observer) == ["I3 over-force"] * is_seen
+
+
+def framed(body: bytes) -> bytes:
+    return body + crc16(body).to_bytes(2, "little")
+
+
+TOLD = framed(b"\x01\x06\x00\x00\x00\x00")
+
+
+@pytest.mark.parametrize(
+    ("observer", "heard", "count"),
+    [
+        (LineObserver(BOUNDS), b"#0100.000\r#0100.000\r", 0),
+        (LineObserver(BOUNDS), b"#0100.000\rhello\r", 1),
+        (RtuObserver(BOUNDS), TOLD + framed(b"\x01\x03\x00\x00\x00\x01"), 0),
+        (RtuObserver(BOUNDS), TOLD + framed(b"\x01\x10\x00\x00\x00\x01"), 1),
+        (RtuObserver(BOUNDS), TOLD + TOLD[:-1] + b"\x00", 1),
+    ],
+)
+def test_what_no_output_device_understands_is_seen(observer: Observer, heard: bytes, count: int) -> None:
+    observer.hear(heard, 1.0)
+    assert len(observer.broken) == count, observer.broken

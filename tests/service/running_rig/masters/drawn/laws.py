@@ -81,7 +81,7 @@ class Laws:
         is_begun = state not in PRESSING and rig.loop.decision.state in PRESSING
         is_local = rig.controller.active_run.is_local  # begun at a terminal, in the step that this write has woken
         is_begun = is_begun and not is_local
-        is_run = state is not State.CALIBRATING and rig.loop.decision.state is State.CALIBRATING and is_begun
+        is_run = state is not State.CALIBRATING and rig.loop.decision.state is State.CALIBRATING and not is_local
         rises = (
             not is_local
             and rig.loop.decision.state in PRESSING
