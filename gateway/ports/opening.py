@@ -98,9 +98,8 @@ def _take_descriptor(port: serial.Serial) -> int:
 
 def _open_configured(path: str, settings: SerialSettings, timeout_s: float) -> serial.Serial:
     if os.path.exists(path) and os.stat(path).st_rdev == _MAKER_OF_TERMINALS:  # noqa: PTH110, PTH116
-        raise OSError(
-            errno.ENOTTY, os.strerror(errno.ENOTTY), path
-        )  # it opens, as a new terminal, and nobody answers there
+        # it would open, as a new terminal, and nobody answers there
+        raise OSError(errno.ENOTTY, os.strerror(errno.ENOTTY), path)
     return serial.Serial(
         path,
         settings.baud,
