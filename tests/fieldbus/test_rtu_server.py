@@ -55,6 +55,11 @@ class Face:
             await asyncio.sleep(0.002)
         return told[0]
 
+    async def until_heard(self, *, frames: int, noise_bytes: int) -> None:
+        """What comes now lies behind a silence, however late this program is."""
+        while (self.server._receiver.frames, self.server._receiver.noise_bytes) != (frames, noise_bytes):
+            await asyncio.sleep(0.001)
+
 
 async def heard(fd: int, size: int) -> bytes:
     """As many bytes as the master's end of the line gets."""
@@ -83,9 +88,10 @@ def test_a_request_is_answered_and_a_foreign_or_damaged_one_gets_no_byte() -> No
         line = Pty()
         async with Face().serving(line.path) as face:
             wanted = encode_adu(3, READ)
-            for unheard in (encode_adu(4, READ), wanted[:-1] + b"\x00", encode_adu(0, P.write_register_request(5, 77))):
+            damaged, to_all = wanted[:-1] + b"\x00", encode_adu(0, P.write_register_request(5, 77))
+            for unheard, frames, noise_bytes in ((encode_adu(4, READ), 1, 0), (damaged, 2, 8), (to_all, 4, 8)):
                 os.write(line.fd, unheard)
-                await asyncio.sleep(0.03)
+                await face.until_heard(frames=frames, noise_bytes=noise_bytes)
                 assert is_silent(line.fd)
                 os.write(line.fd, wanted)
                 assert await heard(line.fd, len(ANSWER)) == ANSWER
@@ -116,7 +122,7 @@ def test_a_port_that_was_unplugged_is_served_again(tmp_path: Path) -> None:
                 f"face {FACE}"
             }
             os.write(lines[1].fd, encode_adu(3, READ)[5:])  # the other half is no request together with the first
-            await asyncio.sleep(0.05)
+            await face.until_heard(frames=0, noise_bytes=3)
             assert is_silent(lines[1].fd)
             os.write(lines[1].fd, encode_adu(3, READ))
             assert await heard(lines[1].fd, len(ANSWER)) == ANSWER
@@ -168,14 +174,10 @@ def test_a_face_that_is_closed_executes_nothing_more_and_waits_as_long_as_the_li
 
 def test_a_port_that_is_back_and_does_not_open_is_told() -> None:
     face, settings = Face(), RtuSettings("/dev/ttyNONE", LINE, unit=3, peer=FACE)
-    server = ModbusRtuServer(
-        face.bank,
-        settings,
-        on_peer_closed=face.gone.append,
-        log=lambda cause, told: face.log.append(f"{cause}: {told}"),
-    )
+    server = ModbusRtuServer(face.bank, settings, on_peer_closed=face.gone.append, log=face.note)
     server.port._on_refused(PortError("E101", "no permission"))
-    assert face.log == [f"face {FACE}: E101 no permission; tried again until it opens"] and face.gone == []
+    assert face.log == ["E101 no permission; tried again until it opens"]
+    assert face.causes == [f"face {FACE}"] and face.gone == []
 
 
 def test_noise_is_told_by_what_is_new_of_it_once_a_minute_and_as_a_wrong_line_only_where_nothing_was_heard() -> None:
@@ -194,15 +196,15 @@ def test_noise_is_told_once_and_a_line_that_is_set_otherwise_as_such() -> None:
     async def scene() -> None:
         line = Pty()
         async with Face().serving(line.path) as face:
-            for _ in range(8):
+            for sent in range(1, 9):
                 os.write(line.fd, b"\xfe\x80\xfe\x80\xf8")
-                await asyncio.sleep(0.005)
+                await face.until_heard(frames=0, noise_bytes=5 * sent)
             assert "is the master set to another baud or parity?" in await face.until_told("W236")
             os.write(line.fd, encode_adu(3, READ) + b"\xff\xff")
             assert await heard(line.fd, len(ANSWER)) == ANSWER
-            for _ in range(3):
+            for sent in range(1, 4):
                 os.write(line.fd, b"\xff\xff\xff")
-                await asyncio.sleep(0.005)
+                await face.until_heard(frames=sent, noise_bytes=42 + 3 * sent)
                 os.write(line.fd, encode_adu(3, READ))
                 assert await heard(line.fd, len(ANSWER)) == ANSWER
             assert len(face.log) <= 3 and all(told.startswith("W23") for told in face.log)
