@@ -7,15 +7,16 @@ nothing to offer. What they need is imported when they are asked.
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import click
 from click.shell_completion import CompletionItem
 
 from gateway.processes.state_directory import CALIBRATIONS, PLANTS, RECORDINGS
 
-Items = list[CompletionItem[str]]
-Words = Callable[[click.Context, str], Iterable[CompletionItem[str]]]
+# Texts, for before click 8.5 an item takes no type.
+Items: TypeAlias = "list[CompletionItem[str]]"
+Words: TypeAlias = "Callable[[click.Context, str], Iterable[CompletionItem[str]]]"
 _MOST: Final = 200
 
 
