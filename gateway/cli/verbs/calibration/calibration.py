@@ -18,6 +18,7 @@ from gateway.cli.command_line.known_rigs import tell_rig_fault
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import exists
 from gateway.processes import exit_codes
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 EXAMPLES = ("calibration list", "calibration compare 1 demo --plot loops.html")
 
 
-@click.group(name="calibration")
+@click.group(name="calibration", cls=SubcommandGroup)
 def command() -> None:
     """List, show, use, compare and export calibrations."""
 

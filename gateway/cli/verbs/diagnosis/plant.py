@@ -16,6 +16,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.known_rigs import tell_rig_fault
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 
 if TYPE_CHECKING:
     from gateway.cli.plants.comparison_page import SimulatedPair
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 EXAMPLES = ("plant list", "plant compare 0 paper-slide")
 
 
-@click.group(name="plant")
+@click.group(name="plant", cls=SubcommandGroup)
 def command() -> None:
     """List, show, compare, add and use plants."""
 
