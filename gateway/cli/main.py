@@ -147,6 +147,12 @@ def _open_standard_streams() -> None:
             setattr(sys, name, open(descriptor, "w" if descriptor else "r", closefd=False))  # noqa: SIM115
 
 
+def _keep_files_for_their_owner() -> None:
+    """Take out of the umask what it takes from the owner (0277, 0777): a state directory, a socket or a recording was made that
+    the gateway itself could not open again, with this umask or any other."""
+    os.umask(os.umask(0o077) & 0o077)
+
+
 def _print_what_the_terminal_can() -> None:
     """Print what is like it, or `?`, for a character that the terminal's encoding does not have, or that a file's name has made
     of a stray byte: a verb that has done its work ended on it."""
@@ -165,6 +171,7 @@ def _refuses_characters(stream: io.TextIOWrapper) -> bool:
 def main() -> None:
     """Run `force-gateway` or `python -m gateway`."""
     _open_standard_streams()
+    _keep_files_for_their_owner()
     _print_what_the_terminal_can()
     if "_FORCE_GATEWAY_COMPLETE" in os.environ:
         from gateway.cli.command_line.bash_completion import use_our_bash
