@@ -135,7 +135,7 @@ def machine(scene: "Scene") -> None:
     if scene.rig.relay is None and scene.draw.random() < 0.5:
         running = scene.laws.run
         acts.begin(scene)
-        if scene.laws.run is not running and seconds > STALL_S:
+        if scene.laws.run not in (None, running) and seconds > STALL_S:  # None: the standstill has ended it
             scene.judge.complain("a run has begun by what has waited")
     scene.rig.run(TICK_S)
 
