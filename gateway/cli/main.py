@@ -6,7 +6,6 @@ import io
 import os
 import sys
 from collections.abc import Iterable
-from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
 from typing import Any, Final
@@ -17,6 +16,7 @@ from gateway import VERSION
 from gateway.cli import plain_spelling
 from gateway.cli.command_line.given_path import refuse_senseless_words
 from gateway.cli.errors import translate_error
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.processes import exit_codes
 
 SECTIONS: Final = {
@@ -54,10 +54,11 @@ def format_examples(examples: Iterable[str]) -> str | None:
     return "\n".join(["\b", "Examples:", *lines]) if lines else None
 
 
-class VerbGroup(click.Group):
+class VerbGroup(SubcommandGroup):
     """Finds verbs by name, and turns whatever they raise into one message. is_interrupted: Ctrl-C has ended the verb."""
 
     is_interrupted = False
+    noun = "verb"
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of the help."""
@@ -92,17 +93,6 @@ class VerbGroup(click.Group):
         if not ctx.resilient_parsing:
             refuse_senseless_words(args)
         return super().parse_args(ctx, args)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the verb, and name the nearest one where there is none of this name."""
-        word = args[0]
-        if word not in VERBS and word not in ALIASES and not word.startswith("-") and not ctx.resilient_parsing:
-            near = get_close_matches(word, VERBS, n=1)
-            meant = f"; did you mean {near[0]}?" if near else f"; there are {', '.join(VERBS)}"
-            ctx.fail(f"{word} is not a verb{meant}")
-        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the verb; turn what it raises into one message."""
@@ -157,6 +147,12 @@ def _open_standard_streams() -> None:
             setattr(sys, name, open(descriptor, "w" if descriptor else "r", closefd=False))  # noqa: SIM115
 
 
+def _keep_files_for_their_owner() -> None:
+    """Take out of the umask what it takes from the owner (0277, 0777): a state directory, a socket or a recording was made that
+    the gateway itself could not open again, with this umask or any other."""
+    os.umask(os.umask(0o077) & 0o077)
+
+
 def _print_what_the_terminal_can() -> None:
     """Print what is like it, or `?`, for a character that the terminal's encoding does not have, or that a file's name has made
     of a stray byte: a verb that has done its work ended on it."""
@@ -175,6 +171,7 @@ def _refuses_characters(stream: io.TextIOWrapper) -> bool:
 def main() -> None:
     """Run `force-gateway` or `python -m gateway`."""
     _open_standard_streams()
+    _keep_files_for_their_owner()
     _print_what_the_terminal_can()
     if "_FORCE_GATEWAY_COMPLETE" in os.environ:
         from gateway.cli.command_line.bash_completion import use_our_bash

@@ -74,6 +74,14 @@ FACE_ERRORS: Final = (
         "Write a token of at least 16 characters there; openssl rand -hex 16 makes one. Browsers ask for it once.",
     ),
     Explanation(
+        "E137",
+        "somebody holds a force already",
+        "`hold` was asked for while the output is enabled and its heartbeat goes on changing.",
+        "A `hold` in another terminal, or a program. From one host both would share one setpoint, and the end of the first "
+        "that lets go.",
+        "End that one first (force-gateway monitor shows the owner); force-gateway write control_word=0 ends it at once.",
+    ),
+    Explanation(
         "E130",
         "no gateway there",
         "Nothing accepted the connection.",

@@ -146,20 +146,20 @@ def _all_lines_to_try(ready: Ready) -> tuple[str, ...]:
 def _try_rtu(rig: Rig, face: ServedFace) -> tuple[str, ...]:
     """Return a command line for a serial face's terminal. A terminal has no parity: mbpoll is told so."""
     force_n, unit = rig.force_to_try_n, face.facts["unit"]
-    if rig.network.owner not in (None, face.facts["host"]):
+    if force_n is None or rig.network.owner not in (None, face.facts["host"]):
         return ()
     if rig.control.supervision.lease_s is not None or rig.network.require_byte_order_echo:
         options = ("" if unit == defaults.UNIT_ID else f" --unit {unit}") + rig.map_option
         line = f"force-gateway hold {force_n:g} --rtu {face.where}{options} --rig {quote(str(rig.file))}"
         return (f"{line}        (over Modbus RTU)",)
     line = f"-b {face.facts['baud']} -P none -a {unit}"
-    return (f"mbpoll -m rtu {line} -1 {_polled(rig, face.where)}        (over Modbus RTU)",)
+    return (f"mbpoll -m rtu {line} -1 {_polled(rig, face.where, force_n)}        (over Modbus RTU)",)
 
 
-def _polled(rig: Rig, where: str) -> str:
-    """Return mbpoll's words that enable with the force to try."""
+def _polled(rig: Rig, where: str, force_n: float) -> str:
+    """Return mbpoll's words that enable with this force."""
     word, force = (rig.register_map.find(name) for name in ("control_word", "force_setpoint"))
-    return f"-r {word.address + 1} {where} 1 {round(force.counts_per_unit * rig.force_to_try_n)}"
+    return f"-r {word.address + 1} {where} 1 {round(force.counts_per_unit * force_n)}"
 
 
 def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
@@ -175,12 +175,14 @@ def try_lines(rig: Rig, host: str, port: int) -> tuple[str, ...]:
     if rig.network.owner and not _is_this_machine(rig.network.owner):
         return (f"force-gateway monitor{where}        ({rig.network.owner} alone may command)",)
     force_n, lease_s = rig.force_to_try_n, rig.control.supervision.lease_s
+    if force_n is None:
+        return (f"force-gateway monitor{where}        (the rig and its calibration share no force to try)",)
     if lease_s is not None or rig.network.require_byte_order_echo:
         pace = (
             "" if lease_s is None or lease_s >= defaults.SHORTEST_UNTOLD_LEASE_S else f" --rig {quote(str(rig.file))}"
         )
         return (f"force-gateway hold {force_n:g}{where}{pace}        (enable, heartbeat; Ctrl-C ramps to 0)",)
-    polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} {_polled(rig, host)}"
+    polled = f"{'' if unit == defaults.UNIT_ID else f' -a {unit}'} -p {port} {_polled(rig, host, force_n)}"
     return (
         f"mbpoll -1{polled}        (enable, {force_n:.2f} N)",
         f"force-gateway write force_setpoint={force_n:g} control_word=1{where}",

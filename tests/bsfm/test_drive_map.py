@@ -82,3 +82,10 @@ def test_one_order_more_is_the_same_curve():
     volts = np.linspace(0.0, 5.0, 51)
     assert elevate_order(curve).order == 3
     assert np.abs(elevate_order(curve).value(volts) - curve.value(volts)).max() < 1.0e-9
+
+
+def test_it_begins_at_the_ranges_first_volt_and_below_that_volts_stay_what_they_are():
+    falling = rising = RationalBezier(1.0, 8.0, (1.0, 5.0, 46.0), (1.0, 1.0, 1.0))
+    scale = DriveMap(Bsfm(Branches(rising, falling), LinearBlend(6.0)))
+    assert [scale.linear_v(volts) for volts in (0.0, 0.5, 1.0)] == pytest.approx([0.0, 0.5, 1.0])
+    assert scale.linear_v(1.5) - scale.linear_v(1.0) == pytest.approx(0.5 * FLATTEST), "a valve's dead start"

@@ -127,6 +127,15 @@ def test_a_bad_set_is_refused_with_index_and_reason(change, index, reason):
     assert fault.sentence(16).endswith("active set 16 unchanged")
 
 
+def test_a_limit_where_its_branches_begin_is_no_number_with_swapped_words():
+    """Branches that a fit has begun at 5e-10 N instead of 0 N have their least force there as well; with its words swapped
+    that is 2.0007 N."""
+    (begins_n,) = struct.unpack(">f", bytes.fromhex("30004000"))
+    curves = {"rising_handles_n": (begins_n, 20.0, 60.0), "falling_handles_n": (begins_n, 30.0, 60.0)}
+    result = check_staged(staged(replace(GOOD, **curves, force_low_n=begins_n)), LIMITS)
+    assert not isinstance(result, StagedFault), result.text
+
+
 def test_force_limits_that_no_branch_reaches_are_told_with_what_is_reached():
     fault = fault_of(staged(replace(GOOD, force_high_n=61.0)))
     assert fault.text == "force limits 1 .. 61 N, the branches reach 0 .. 60 N"

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.clients.wiring import wiring_page
 from gateway.control.settings import LeaseAction
 from gateway.devices.messages import ForceSample, Quality
 from gateway.profiles import load_register_map, load_rig
@@ -155,6 +156,30 @@ def test_the_force_to_try_is_one_that_the_rig_takes(least_n: float, most_n: floa
     limits = replace(demo().control.limits, smallest_force_n=least_n, force_max_n=most_n)
     rig = replace(demo(), control=replace(demo().control, limits=limits))
     assert f"force_setpoint={tried_n} " in try_lines(rig, "127.0.0.1", 5020)[1]
+
+
+@pytest.mark.parametrize(
+    ("least_n", "most_n", "tried_n"),
+    [(40.0, 65.0, 50.0), (59.0, 65.0, 60.0), (62.0, 65.0, None), (59.992, 59.994, None)],
+)
+def test_the_force_to_try_is_within_the_calibrations_limits_too_or_there_is_none(
+    least_n: float, most_n: float, tried_n: float | None
+) -> None:
+    """A set from an upload may be for 62 .. 65 N, on a rig that takes 60 N at most: 61 N was proposed, which is refused."""
+    rig = replace(demo(), calibration=replace(demo().calibration, force_limits_n=(least_n, most_n)))
+    assert rig.force_to_try_n == tried_n
+
+
+def test_where_there_is_no_force_to_try_none_is_named() -> None:
+    rig = replace(demo(), calibration=replace(demo().calibration, force_limits_n=(62.0, 65.0)))
+    terminal = ServedFace("rtu", "/dev/pts/7", "", {"host": "serial:1", "unit": 1, "baud": 19200, "is_terminal": True})
+    tried = [line for line in format_banner(ready(rig=rig, faces=(terminal,))).splitlines() if line.startswith("  try")]
+    assert tried == ["  try          force-gateway monitor        (the rig and its calibration share no force to try)"]
+    mbpoll = next(section for section in wiring_page(rig, "narrow")[1] if section.title.startswith("mbpoll"))
+    assert "share no force to try" in " ".join(mbpoll.sentences) and not any(
+        "enable" in line for line in mbpoll.commands
+    )
+    assert any("disable" in line for line in mbpoll.commands)
 
 
 def test_the_lines_to_try_are_of_the_rig_at_hand() -> None:

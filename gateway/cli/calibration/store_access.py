@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from gateway import defaults
 from gateway.cli.change_in_use import ask_until_done, not_running
+from gateway.cli.command_line.known_rigs import tell_rig_fault
 from gateway.cli.errors import CliError
 from gateway.processes import exit_codes
 
@@ -35,11 +36,12 @@ def find_calibration(store: "CalibrationStore", which: str) -> "Calibration":
         raise CliError(str(error), exit_codes.DATA) from None
 
 
-def in_use(store: "CalibrationStore") -> "Calibration":
+def in_use(store: "CalibrationStore", rig_name: str) -> "Calibration":
     """Return the calibration in use, or the one that a gateway would start with."""
     calibration = store.find_selected().document
     if calibration is None:
-        raise CliError(f"E433 nothing is stored in {store.directory}; --rig names the rig's own", exit_codes.DATA)
+        why = tell_rig_fault(rig_name) or "--rig names the rig's own"
+        raise CliError(f"E433 nothing is stored in {store.directory}; {why}", exit_codes.DATA)
     return calibration
 
 
@@ -78,7 +80,8 @@ def _change_without_gateway(directory: Path, rig_name: str, request: dict[str, A
         raise CliError(str(error), exit_codes.FAILED if error.code == "E431" else exit_codes.DATA) from None
     calibration, active = selected.calibration, selected.pointer.active
     said = f"calibration {calibration.number} ({calibration.name}) will be used from the next start: no gateway runs"
-    doubts = rig.doubts_on(calibration) if rig else ""
+    fault = "" if rig else tell_rig_fault(rig_name)
+    doubts = rig.doubts_on(calibration) if rig else fault and f"not judged by this rig's limits: {fault}"
     return {
         "active": calibration.number,
         "name": calibration.name,

@@ -7,6 +7,7 @@ the one whose recordings lie there: by the files of demo its own calibration, li
 
 import os
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -129,3 +130,19 @@ def directory_of(state: Path | None, rig: str | None) -> Path:
     from gateway.service.supervisor.run_options import RunOptions
 
     return RunOptions(rig=rig or choose_rig(None, None)).state_directory if state is None else state
+
+
+def tell_rig_fault(rig_name: str) -> str:
+    """Return what is to be mended in the rig's file before it can be read; empty where nothing is, and of a name
+    without a file."""
+    from gateway.profiles import ProfileError, read_rig
+    from gateway.profiles.find import locate
+
+    try:
+        locate("rig", rig_name)
+        read_rig(rig_name)
+    except FileNotFoundError:
+        return ""
+    except ProfileError as error:
+        return f"{error.faults[0]} (`force-gateway check {quote(rig_name)}` tells of every fault)"
+    return ""

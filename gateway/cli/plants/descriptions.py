@@ -35,10 +35,10 @@ def _numbers(cause: FoundCause) -> str:
     )
 
 
-def describe_compensation(plant: NumberedPlant, rig: Rig | None) -> tuple[str, ...]:
-    """Return what control would take back of a plant on this rig, and of what not and why."""
+def describe_compensation(plant: NumberedPlant, rig: Rig | None, fault: str = "") -> tuple[str, ...]:
+    """Return what control would take back of a plant on this rig, and of what not and why. fault: why there is no rig."""
     if rig is None:
-        return ("what is compensated depends on the rig: --rig names it",)
+        return (f"what is compensated depends on the rig: {fault or '--rig names it'}",)
     return (f"plant {plant.number} on rig {rig.name}", *compensation_words(compensation_on(rig, plant.profile)))
 
 

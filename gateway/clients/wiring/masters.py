@@ -218,12 +218,13 @@ def _mbpoll(rig: Rig, table: ExchangeTable, called: str) -> Section:
             lines.append(f"{base} -t 4:float{order} -r {first + 1} {where.host}    # force_measured in N, {block.name}")
     sentences = ["-r counts from 1: register 1 is address 0."]
     force_n = rig.force_to_try_n
-    counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
     endpoint = f"{where.shown}{where.unit_option}"
     if network.owner:
         sentences.append(f"Only {network.owner} may command here (network.owner): others read, and disable.")
     if is_no_address(network.owner):
         pass  # nobody on plain Modbus TCP
+    elif force_n is None:
+        sentences.append("The rig and its calibration share no force to try (limits, force_limits_n).")
     elif lease_s is not None or network.require_byte_order_echo:
         why = (
             "keeps no heartbeat" if lease_s is not None else "writes 1234.5 to byte_order_echo only where it is told to"
@@ -233,6 +234,7 @@ def _mbpoll(rig: Rig, table: ExchangeTable, called: str) -> Section:
         pace = f" --rig {called}" if lease_s is not None and lease_s < defaults.SHORTEST_UNTOLD_LEASE_S else ""
         lines.append(f"{hold}{pace}    # enable, heartbeat; Ctrl-C ramps to 0")
     else:
+        counts = round(force_n * table.at("force_setpoint", "command").counts_per_unit)
         lines.append(f"{base} -r {command + 1} {where.host} 1 {counts}    # enable, {force_n:.2f} N, and it lasts")
     lines.append(f"{base} -r {command + 1} {where.host} 0    # disable: safe voltage")
     return Section("mbpoll, to try it", tuple(sentences), commands=tuple(lines))

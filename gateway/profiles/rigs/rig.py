@@ -197,15 +197,16 @@ class Rig:
         return map_option(self.register_map)
 
     @property
-    def force_to_try_n(self) -> float:
-        """12 N, or a force in the middle of what the rig may press with, to whole newtons where that can be."""
-        limits, calibration = self.control.limits, self.calibration.model()
-        low_n = max(limits.smallest_force_n, calibration.force_range_n[0])
-        high_n = min(limits.force_max_n, calibration.force_range_n[1])
-        if low_n <= _FORCE_TO_TRY_N <= high_n:
-            return _FORCE_TO_TRY_N
+    def force_to_try_n(self) -> float | None:
+        """12 N, or a force in the middle of what the rig may press with, to whole newtons where that can be. None where its
+        limits and those of the calibration share no force: one from `calibration use` or an upload may be for more."""
+        limits, (least_n, most_n) = self.control.limits, self.calibration.model().force_range_n
+        allowed_n = self.calibration.allowed_n
+        low_n = max(limits.smallest_force_n, least_n, allowed_n[0])
+        high_n = min(limits.force_max_n, most_n, allowed_n[1])
         middle_n = 0.5 * (low_n + high_n)
-        return round(middle_n) if low_n <= round(middle_n) <= high_n else round(middle_n, 2)
+        tried_n = (_FORCE_TO_TRY_N, round(middle_n), round(middle_n, 2))
+        return next((force_n for force_n in tried_n if low_n <= force_n <= high_n and force_n > 0.0), None)
 
     def model_of(self, calibration: Calibration, model: Bsfm) -> Bsfm:
         """Return the calibration's model as control uses it here: a bent command map is straightened, but for a

@@ -15,6 +15,7 @@ from gateway.telemetry.mqtt.round_trips import ASK_S, SLOW_S, RoundTrips
 
 AGAIN_S: Final = 2.0
 _KEEPALIVE_S: Final = 10
+_SILENT_S: Final = 3.0 * _KEEPALIVE_S  # by then the keepalive has ended a connection that is dead
 _SHORT_S: Final = 10.0
 _CONNACK: Final = 2  # a type of packet (MQTT 3.1.1, 2.2.1)
 _MOST_SHORT: Final = 3  # connections in a row; then it is no broker that comes and goes
@@ -52,7 +53,7 @@ async def keep_connected(
                 unheard = await _subscribe(client, session)
                 news.note_connected()  # one that does not answer a subscription is no broker that is back
                 news.note_unheard(unheard)
-                await _carry(client, session, queue)
+                await _carry(client, session, queue, news)
         except* (aiomqtt.MqttError, OSError, UnicodeError) as lost:
             first = _first(lost)
             (news.note_refused if _is_refusal(first) else news.note_lost)(_reason(first))
@@ -68,7 +69,7 @@ class BrokerNews:
 
     def __init__(self, broker: str, name: str, say: Callable[[str], None], clock: Callable[[], float]) -> None:
         self._broker, self._name, self._say, self._clock = broker, name, say, clock
-        self._is_away = False
+        self._is_away = self._is_silent = False
         self._refused = ""
         self._unheard: list[str] = []
         self._connected_s: float | None = None
@@ -89,6 +90,15 @@ class BrokerNews:
                 "heard. Allow its user to read there"
             )
         self._unheard = topics
+
+    def note_waiting(self, waits_s: float) -> None:
+        """Note for how long the answer is missing that says how old commands are: told once, until one is quick again."""
+        if waits_s > _SILENT_S and not self._is_silent:
+            self._say(
+                f"E181 {self._broker} has not answered an UNSUBSCRIBE for {_SILENT_S:g} s: how old its commands are is not "
+                "known, and none but a stop is carried out. A broker of MQTT 3.1.1 answers it (3.10.4): look at its log"
+            )
+        self._is_silent = waits_s > SLOW_S and (self._is_silent or waits_s > _SILENT_S)
 
     def note_refused(self, reason: str) -> None:
         """Note that it is there, and does not let us in: told, too, where it was away before, and once for each reason."""
@@ -178,7 +188,7 @@ async def _subscribe(client: Any, session: BrokerSession) -> list[str]:
     return [topic for topic, codes in answers if any(code.is_failure for code in codes)]
 
 
-async def _carry(client: Any, session: BrokerSession, queue: CommandQueue) -> None:
+async def _carry(client: Any, session: BrokerSession, queue: CommandQueue, news: BrokerNews) -> None:
     """Say what the session has, and have it answer, until the connection is lost."""
     turn = asyncio.Lock()  # messages carry numbers in order: nobody speaks between the making of one and its sending
     for message in session.announce():
@@ -190,6 +200,7 @@ async def _carry(client: Any, session: BrokerSession, queue: CommandQueue) -> No
         group.create_task(queue.standstill.keep_time())
         if session.may_press:
             group.create_task(_keep_asking(client, session, queue, turn))
+            group.create_task(_tell_silence(client, session, queue, turn, news))
 
 
 async def _send_messages(client: Any, session: BrokerSession, turn: asyncio.Lock) -> None:
@@ -212,20 +223,33 @@ async def _listen(client: Any) -> None:
 
 
 async def _keep_asking(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:
-    """Ask the broker for what it answers without effect (MQTT 3.1.1, 3.10.4): the end of a subscription that never was. That
-    no answer comes at all is the keepalive's to find."""
+    """Ask the broker for what it answers without effect (MQTT 3.1.1, 3.10.4): the end of a subscription that never was."""
     while True:
         queue.trips.note_asked()
         await client.unsubscribe("force-gateway/round-trip", timeout=inf)
         queue.trips.note_answered()
-        if late := queue.take_late():
-            why = (
-                f"{late} commands were not carried out: the broker took over {SLOW_S:g} s to answer, as old they may be"
-            )
-            async with turn:
-                for answer in await session.answer("", b"", why):
-                    await _publish(client, answer)
+        await _tell_late(client, session, queue, turn)
         await asyncio.sleep(ASK_S)
+
+
+async def _tell_silence(
+    client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock, news: BrokerNews
+) -> None:
+    """Tell of a broker that keeps the connection alive and never answers that question: its commands came to nothing without
+    a word."""
+    while True:
+        await asyncio.sleep(_KEEPALIVE_S)
+        news.note_waiting(queue.trips.waits_s)
+        if queue.trips.waits_s > _SILENT_S:
+            await _tell_late(client, session, queue, turn)
+
+
+async def _tell_late(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:
+    if late := queue.take_late():
+        why = f"{late} commands were not carried out: the broker took over {SLOW_S:g} s to answer, as old they may be"
+        async with turn:
+            for answer in await session.answer("", b"", why):
+                await _publish(client, answer)
 
 
 async def _answer(client: Any, session: BrokerSession, queue: CommandQueue, turn: asyncio.Lock) -> None:

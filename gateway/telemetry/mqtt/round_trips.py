@@ -37,4 +37,9 @@ class RoundTrips:
 
     @property
     def _is_overdue(self) -> bool:
-        return self._asked_s is not None and self._clock() - self._asked_s > SLOW_S
+        return self.waits_s > SLOW_S
+
+    @property
+    def waits_s(self) -> float:
+        """For how long the broker has not answered; 0 where it is not asked."""
+        return 0.0 if self._asked_s is None else self._clock() - self._asked_s

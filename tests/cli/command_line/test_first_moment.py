@@ -1,6 +1,7 @@
 """The first moment of a command, before click can answer for it, and the terminal that it prints to."""
 
 import io
+import os
 import signal
 import subprocess
 import sys
@@ -74,3 +75,14 @@ def test_before_it_is_caught_next_to_nothing_is_read() -> None:
     )
     read = subprocess.run([sys.executable, "-I", "-S", "-c", program], capture_output=True, text=True, check=True)
     assert read.stdout.strip() == "['gateway', 'gateway.__main__']"
+
+
+@pytest.mark.parametrize(("umask", "others"), [(0o777, 0), (0o277, 0), (0o327, 0o050)])
+def test_what_a_verb_makes_is_its_owners_whatever_the_umask_says(tmp_path: Path, umask: int, others: int) -> None:
+    """By umask 0777 the state directory was made as one that nobody but root can open, and every later start was refused."""
+    words = ("calibration", "export", "1", "--c", str(tmp_path / "made" / "c"))
+    environment = {**os.environ, "XDG_STATE_HOME": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-m", "gateway", *words], check=True, umask=umask, env=environment)
+    modes = {path.name: path.stat().st_mode & 0o777 for path in (tmp_path / "made").rglob("*")}
+    assert modes.pop("c") == 0o700 | others
+    assert modes and set(modes.values()) == {0o600 | others & 0o666}

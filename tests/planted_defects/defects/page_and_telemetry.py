@@ -131,4 +131,6 @@ DEFECTS = (
            "            if False:\n", ("telemetry/mqtt/test_told_values.py",)),
     Defect("the page keeps a plant that nobody wants kept", "web/tabs/diagnosis_job.py",
            "[\"--save\"] if job.keeps_plant else []", "[\"--save\"]", ("web/tabs/test_diagnosis_tab.py",)),
+    Defect("of a broker that answers no question nobody is told", "telemetry/mqtt/broker_connection.py",
+           "        news.note_waiting(queue.trips.waits_s)\n", "", ("telemetry/mqtt/test_late_broker.py",)),
 )  # fmt: skip

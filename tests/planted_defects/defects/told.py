@@ -133,4 +133,6 @@ DEFECTS = (
     Defect("noise that makes a reading now and then is a stream", "service/probing/harmless_questions.py",
            "    return count if 2 * count > len(messages) else 0", "    return count",
            ("service/probing/test_told_rates.py",)),
+    Defect("a umask takes the gateway's own files from its user", "cli/main.py",
+           "    os.umask(os.umask(0o077) & 0o077)\n", "    pass\n", ("cli/command_line/test_first_moment.py",)),
 )  # fmt: skip

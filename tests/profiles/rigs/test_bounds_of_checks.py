@@ -198,6 +198,12 @@ BOUNDS: tuple[tuple[Check, str, Parts, Parts], ...] = (
         replace(calibration(), trim=Trim(gain_v_per_n_s=0.1, limit_v=3.0)),
     ),
     (
+        checks.check_calibration_range,
+        "limits.force_max_n",
+        replace(calibration(force_limits_n=(50.0, 65.0)), limits=LIMITS),
+        replace(calibration(force_limits_n=(50.1, 65.0)), limits=LIMITS),
+    ),
+    (
         line_checks.check_output_range,
         "limits.safe_voltage_v",
         parts(output_device=output(voltage_range_v=(0.0, 9.0))),

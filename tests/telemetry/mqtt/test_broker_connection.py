@@ -103,6 +103,7 @@ def play(
     scene: Scene,
     *payloads: bytes,
     publish: Callable[[bytes], Awaitable[None]] | None = None,
+    say: Callable[[str], None] = lambda text: None,
 ) -> Session:
     """Keep a connection while the scene is played. publish: instead of noting what is said."""
 
@@ -116,7 +117,7 @@ def play(
 
         session, library = Session(*payloads), Library(note)
         monkeypatch.setattr(broker_connection, "import_library", lambda name: library)
-        keeping = asyncio.create_task(keep_connected(Broker("b", 1883), session, lambda text: None, again_s=0.0))
+        keeping = asyncio.create_task(keep_connected(Broker("b", 1883), session, say, again_s=0.0))
         async with asyncio.timeout(5.0):
             await scene(session, library, said)
         keeping.cancel()

@@ -94,6 +94,37 @@ def test_an_enable_that_the_broker_has_held_up_is_told_and_not_carried_out(
     play(monkeypatch, scene)
 
 
+def test_a_broker_that_keeps_the_connection_and_never_answers_is_told_and_so_are_its_commands(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It answered PINGREQ and no UNSUBSCRIBE: no command was carried out, and neither log nor result said a word."""
+    clock, told = Clock(), list[str]()
+    monkeypatch.setattr(broker_connection, "RoundTrips", lambda _clock: RoundTrips(clock))
+    monkeypatch.setattr(broker_connection, "ASK_S", 0.0)
+    monkeypatch.setattr(broker_connection, "_KEEPALIVE_S", 0.0)
+
+    async def scene(session: Session, library: Library, said: list[bytes]) -> None:
+        for silence in (1, 2):
+            library.answering.clear()
+            await turns()
+            clock.now_s += 29.9
+            library.bring(b"enable", retain=False)
+            await turns()
+            assert len(told) == silence - 1 and len(session.answered) == silence - 1
+            clock.now_s += 0.2
+            await turns()
+            assert len(told) == silence and told[-1].startswith("E181 the MQTT broker b:1883 has not answered")
+            assert session.answered[-1].startswith(b"1 commands were not carried out")
+            clock.now_s += 600.0
+            await turns()
+            assert len(told) == silence, "once"
+            library.answering.set()
+            await turns()
+
+    play(monkeypatch, scene, say=told.append)
+    assert len(told) == 2
+
+
 def test_what_nobody_has_asked_the_broker_for_is_not_carried_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """A broker that brought `{"force_setpoint": 12, "control_word": 1}` on any topic at all had the tool pressed."""
 

@@ -14,9 +14,11 @@ import click
 from gateway.cli.command_line.completion_words import complete_calibration_numbers, complete_calibrations
 from gateway.cli.command_line.folding import fold_entry
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.known_rigs import tell_rig_fault
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import exists
 from gateway.processes import exit_codes
 
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 EXAMPLES = ("calibration list", "calibration compare 1 demo --plot loops.html")
 
 
-@click.group(name="calibration")
+@click.group(name="calibration", cls=SubcommandGroup)
 def command() -> None:
     """List, show, use, compare and export calibrations."""
 
@@ -62,7 +64,8 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
         lines += fold_entry(store.built_in.number, description, mark)
     else:
         is_used = ", in use," if selected.selection.number is None else ""
-        click.echo(f"the rig's own{is_used} is not shown: give the rig's file by --rig", err=True)
+        why = tell_rig_fault(state.rig) or "give the rig's file by --rig"
+        click.echo(f"the rig's own{is_used} is not shown: {why}", err=True)
     for entry in entries:
         is_rejected = entry.document is not None and bool(entry.document.rejected)
         mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
@@ -83,7 +86,7 @@ def show_command(*, which: str | None, state: StateChoice, as_json: bool) -> Non
     from gateway.cli.calibration.store_access import find_calibration, in_use, open_store
 
     store = open_store(state.directory, state.rig)
-    calibration = find_calibration(store, which) if which else in_use(store)
+    calibration = find_calibration(store, which) if which else in_use(store, state.rig)
     click.echo(json.dumps(asdict(calibration), indent=2) if as_json else as_text(calibration), nl=as_json)
 
 

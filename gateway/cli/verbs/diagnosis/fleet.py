@@ -15,6 +15,7 @@ from gateway.cli.command_line.rig_choice import rig_option
 from gateway.cli.command_line.table_options import table_options
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import count_of, json_option
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import exists, is_file
 from gateway.processes import exit_codes
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 Function = Callable[..., Any]
 
 
-@click.group(name="fleet")
+@click.group(name="fleet", cls=SubcommandGroup)
 def command() -> None:
     """Fit or diagnose many recordings of many cells."""
 

@@ -13,8 +13,10 @@ import click
 from gateway.cli.command_line.completion_words import complete_plant_numbers, complete_recordings
 from gateway.cli.command_line.folding import fold_entry
 from gateway.cli.command_line.given_path import GivenPath
+from gateway.cli.command_line.known_rigs import tell_rig_fault
 from gateway.cli.command_line.listed_number import ListedNumber
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 
 if TYPE_CHECKING:
     from gateway.cli.plants.comparison_page import SimulatedPair
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 EXAMPLES = ("plant list", "plant compare 0 paper-slide")
 
 
-@click.group(name="plant")
+@click.group(name="plant", cls=SubcommandGroup)
 def command() -> None:
     """List, show, compare, add and use plants."""
 
@@ -77,7 +79,8 @@ def show_command(*, number: int, state: StateChoice, as_json: bool) -> None:
         click.echo(json.dumps(all_plant_facts(plant, rig), indent=2))
         return
     text = as_text(plant) if number else plant_text(plant.profile)
-    for line in (*describe_provenance(plant), *describe_compensation(plant, rig), "", text.rstrip()):
+    fault = "" if rig else tell_rig_fault(state.rig)
+    for line in (*describe_provenance(plant), *describe_compensation(plant, rig, fault), "", text.rstrip()):
         click.echo(line)
 
 

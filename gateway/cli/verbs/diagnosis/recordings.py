@@ -17,6 +17,7 @@ from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError, already_exists
 from gateway.cli.options import StateChoice, json_option, state_options
 from gateway.cli.recordings.named_recording import LAST, numbered_recording
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import exists
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RECORDINGS
@@ -40,7 +41,7 @@ _number = click.argument(
 _yes = click.option("--yes", is_flag=True, help="Do not ask.")
 
 
-@click.group(name="recordings")
+@click.group(name="recordings", cls=SubcommandGroup)
 def command() -> None:
     """List, show, plot, keep and export recordings.
 

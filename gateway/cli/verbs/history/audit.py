@@ -9,6 +9,7 @@ from gateway.audit.audit_reader import read_audit, verify_audit
 from gateway.cli.command_line.since_option import YoungerRecords, since_option
 from gateway.cli.errors import CliError, no_state_directory
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import exists, is_directory, other_kind
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import AUDIT
@@ -16,7 +17,7 @@ from gateway.processes.state_directory import AUDIT
 EXAMPLES = ("audit show --since 1h", "audit verify")
 
 
-@click.group(name="audit")
+@click.group(name="audit", cls=SubcommandGroup)
 def command() -> None:
     """Show and verify the record of writes."""
 

@@ -11,6 +11,7 @@ import click
 from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.errors import CliError
 from gateway.cli.options import json_option
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.plain_file import is_directory
 from gateway.processes import exit_codes
 
@@ -37,7 +38,7 @@ EXAMPLES = (
 )
 
 
-@click.group(name="service")
+@click.group(name="service", cls=SubcommandGroup)
 def command() -> None:
     """Keep a gateway running by systemd."""
 

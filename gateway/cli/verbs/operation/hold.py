@@ -68,12 +68,13 @@ def command(
     """Hold NEWTON until Ctrl-C, which ramps the force to 0.
 
     Sets the force, enables, and keeps the heartbeat that a rig with a lease wants. A second Ctrl-C skips the ramp; Ctrl-Z
-    does what Ctrl-C does.
+    does what Ctrl-C does. While another one beats it is refused; a force that was left is taken over.
 
     The lease is read from a gateway on this machine (unless it runs with a --state of its own); for a remote one give
     --rig.
     """
     from gateway.cli.force_hold.heartbeat import HeartbeatThread
+    from gateway.cli.force_hold.other_holder import check_nobody_holds
     from gateway.cli.force_hold.sequence import HoldRun
     from gateway.cli.master.client import GatewayClient
     from gateway.cli.master.first_heartbeat import draw_first_heartbeat
@@ -86,8 +87,8 @@ def command(
     with GatewayClient(wire, options["unit"], register_map) as client:
         with explain_refusals(client):
             client.check_map()
-            (heartbeat,) = client.read_values([register_map.find("heartbeat")])
-        run = HoldRun(force_n, heartbeat=draw_first_heartbeat(int(heartbeat.value)), resets=options["resets"])
+            standing = check_nobody_holds(client)
+        run = HoldRun(force_n, heartbeat=draw_first_heartbeat(standing), resets=options["resets"])
         beat = HeartbeatThread(client, run, lease, time.monotonic)
         _show_until_end(beat, for_s, as_json=as_json)
     _report_end(beat, client.where, as_json=as_json)

@@ -9,6 +9,7 @@ import click
 from gateway.cli.command_line.completion_words import complete_setting_names, complete_settings
 from gateway.cli.errors import CliError
 from gateway.cli.options import StateChoice, json_option, state_options
+from gateway.cli.subcommands import SubcommandGroup
 from gateway.processes import exit_codes
 from gateway.processes.state_directory import RIG_SOCKET
 
@@ -18,7 +19,7 @@ _COLUMN: Final = 32
 EXAMPLES = ("sim set creep=on", "sim list")
 
 
-@click.group(name="sim")
+@click.group(name="sim", cls=SubcommandGroup)
 def command() -> None:
     """Set faults and effects on a simulated rig while it runs.
 

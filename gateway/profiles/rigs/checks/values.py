@@ -101,7 +101,8 @@ def check_self_test(parts: Parts) -> Found:
 
 
 def check_calibration_range(parts: Parts) -> Found:
-    """Yield a fault where the maximum force exceeds the calibration, or leaves the trim no room above it."""
+    """Yield a fault where the maximum force exceeds the calibration, is below all that it is for, or leaves the trim no room
+    above it."""
     if (limits := parts.limits) is None or (calibration := parts.calibration) is None:
         return
     model, most = calibration.model(), limits.force_max_n
@@ -109,6 +110,10 @@ def check_calibration_range(parts: Parts) -> Found:
     if most > reach:
         end = f"{reach:.1f} N, where calibration {calibration.name} ends ({volt(calibration.x1_v)})"
         yield "limits.force_max_n", f"{newton(most)} is above {end}"
+        return
+    if calibration.force_limits_n and most < calibration.force_limits_n[0]:
+        own = f"calibration {calibration.name} is for {newton(calibration.force_limits_n[0])} and more"
+        yield "limits.force_max_n", f"{newton(most)}: {own}, so no setpoint but 0 would be taken"
         return
     trim_v = parts.trim.limit_v if parts.trim and parts.trim.gain_v_per_n_s > 0 else 0.0
     needed_v = model.branches.rising.inverse(most)[0] + trim_v

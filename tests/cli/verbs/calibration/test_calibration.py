@@ -224,6 +224,24 @@ def test_where_the_rigs_own_is_not_known_the_list_says_so_and_whether_it_is_in_u
     assert "the rig's own is not shown" in stored.stderr
 
 
+def test_beside_a_broken_rig_file_all_that_is_stored_is_at_hand_and_what_to_mend_is_said(state, call, tmp_path):
+    """`list` and `show` asked for the rig's file by --rig, which had been given."""
+    rig = tmp_path / "own.yaml"
+    rig.write_text("name: own\nloop_hz: [\n")
+    given, place = ("--state", state, "--rig", rig), f"{rig}:3:1: "
+    listed = call("calibration", "list", *given)
+    assert [entry[0][:4] for entry in entries(listed.stdout)] == ["   2", "*  3"]
+    assert place in listed.stderr and f"force-gateway check {rig}" in listed.stderr and "--rig" not in listed.stderr
+    assert call("calibration", "show", *given).stdout.startswith("number: 3")
+    assert call("calibration", "export", 2, *given).stdout.startswith("number: 2")
+    used = call("calibration", "use", 2, *given)
+    assert used.exit_code == 0 and f"not judged by this rig's limits: {place}" in used.output
+    assert active(state) == 2 and call("calibration", "rollback", *given).exit_code == 0 and active(state) == 3
+    (tmp_path / "fresh").mkdir()
+    nothing = call("calibration", "show", "--state", tmp_path / "fresh", "--rig", rig)
+    assert nothing.exit_code == 65 and place in nothing.stderr
+
+
 def test_a_rejected_one_is_listed_as_such_and_used_only_by_force(state, call):
     store = CalibrationStore(state, load_calibration("demo"))
     number = store.add(calibration(32, rejected="0.600 N RMS on all 59 measured points"))

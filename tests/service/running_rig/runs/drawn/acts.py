@@ -1,6 +1,7 @@
 """What masters and people at the machine ask for, as a scene draws it."""
 
 import os
+from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from gateway.modbus import Peer
@@ -95,7 +96,7 @@ def stop(scene: "Scene") -> None:
     elif way == "hangs":
         scene.beating ^= {master.host}
         scene.judge.is_disturbed = True
-        scene.judge.befallen.add("hangs")
+        scene.judge.befallen["hangs"] = inf if len(scene.beating) < len(MASTERS) else scene.rig.now()
         scene.note(f"{master.host} {'beats' if master.host in scene.beating else 'hangs'}")
     elif way == "disk":
         _fill_disk(scene)

@@ -19,10 +19,10 @@ SHORT_S: Final = 0.02, 0.04, 0.08, 0.15, 0.4, 1.2, 4.0
 
 def for_a_while(scene: "Scene", begin: Callable[[], object], end: Callable[[], object]) -> None:
     """As told last."""
-    scene.judge.note_event(scene.told[-1].partition(" ")[2])
+    scene.judge.note_event(scene.told[-1].partition(" ")[2], lasts=True)
     begin()
     scene.rig.run(scene.draw.choice(SHORT_S))
-    scene.judge.note_event()
+    scene.judge.disturb()
     if scene.draw.random() < 0.8:
         end()
 
@@ -54,6 +54,7 @@ def _unplug_cell(scene: "Scene") -> None:
 def _heal_cell(scene: "Scene") -> None:
     rig = scene.rig
     rig.cell, rig.cell_late, rig.loop.cell_lost, rig.plant.noise_n = "well", 0, False, rig.noise_n
+    scene.judge.note_end("cell")
 
 
 def output(scene: "Scene") -> None:
@@ -74,8 +75,15 @@ def _heal_output(scene: "Scene") -> None:
     if how == "tripped":
         return  # until somebody resets
     rig.wire.how = "well"
+    scene.judge.note_end("output")
     if how == "away":
         rig.loop.on_output_opened()
+
+
+def note_reset(scene: "Scene") -> None:
+    """A watchdog that had tripped watches again."""
+    if scene.rig.wire.how == "well":
+        scene.judge.note_end("output")
 
 
 def valve(scene: "Scene") -> None:
@@ -96,6 +104,7 @@ def valve(scene: "Scene") -> None:
 def _heal_valve(scene: "Scene") -> None:
     if relay := scene.rig.relay:
         relay.is_stuck, relay.silent_s, relay.lost = False, None, False
+        scene.judge.note_end("valve")
 
 
 def tool(scene: "Scene") -> None:
@@ -120,12 +129,13 @@ def machine(scene: "Scene") -> None:
     """It stands still, or sleeps."""
     seconds, is_suspended = scene.draw.choice((0.05, 0.09, 0.13, 0.5, 3.0)), scene.draw.random() < 0.4
     scene.note(f"{'sleeps' if is_suspended else 'stands still'} for {seconds} s")
-    scene.judge.note_event("machine")
+    scene.judge.note_event("machine", lasts=True)
     scene.rig.stand_still(seconds, is_suspended=is_suspended)
+    scene.judge.note_end("machine")
     if scene.rig.relay is None and scene.draw.random() < 0.5:
         running = scene.laws.run
         acts.begin(scene)
-        if scene.laws.run is not running and seconds > STALL_S:
+        if scene.laws.run not in (None, running) and seconds > STALL_S:  # None: the standstill has ended it
             scene.judge.complain("a run has begun by what has waited")
     scene.rig.run(TICK_S)
 

@@ -4,7 +4,7 @@ Shares nothing with control: what is stated (limits, a run's largest force), wha
 rig are all that it knows.
 """
 
-from math import isfinite
+from math import inf, isfinite
 
 from gateway.codes.faults import FaultCode
 from gateway.control import LeaseAction
@@ -25,7 +25,9 @@ CAUSES = {
     FaultCode.VALVE_SILENT: ("valve silent", "valve away"),
     FaultCode.VALVE_ALTERED: ("valve stuck",),
 }
-"""Of each fault what alone it may be told of; of the others, whatever has befallen the rig."""
+"""Of each fault what alone it may be told of; of the others, whatever has disturbed the rig."""
+TOLD_S = 0.5
+"""So long behind its end what has befallen the rig may be told of."""
 FROZEN_S, FROZEN_N = 2.0, 3.0
 """A cell that repeats itself for so long, while the force must have changed by so much."""
 TOUCHING_N = 1.0
@@ -42,7 +44,7 @@ class Judge:
         self.rig, self.laws = rig, RunLaws(rig)
         self.is_disturbed = self.begins = False
         self.taken_by: str | None = None
-        self.befallen: set[str] = set()
+        self.befallen: dict[str, float] = {}  # what, and until when
         self._frozen_v: float | None = None
         self._moved_s = 0.0
         self._state, self._volts = State.OFF, rig.wire.voltage_v
@@ -63,6 +65,12 @@ class Judge:
         return decision.state if decision else State.OFF
 
     @property
+    def is_over(self) -> bool:
+        """Whether nothing has befallen the rig for so long that it may not be told of any more."""
+        ends_s = (until_s for until_s in self.befallen.values() if until_s < inf)
+        return self.rig.now() > max(self._changed_s, *ends_s, 0.0) + TOLD_S
+
+    @property
     def is_on(self) -> bool:
         return self.state in ON
 
@@ -77,9 +85,19 @@ class Judge:
         self.laws.look(state)
         self._state = state
 
-    def note_event(self, kind: str = "") -> None:
-        """Something is befalling the rig now."""
-        self.befallen.add(kind)
+    def note_event(self, kind: str, *, lasts: bool = False) -> None:
+        """Something befalls the rig now; lasts: until `note_end`."""
+        self.befallen[kind] = inf if lasts else self.rig.now()
+        self.disturb()
+
+    def note_end(self, kind: str) -> None:
+        """What befell this part of the rig is over: `cell`, say."""
+        for each, until_s in self.befallen.items():
+            if each.startswith(kind):
+                self.befallen[each] = min(until_s, self.rig.now())
+
+    def disturb(self) -> None:
+        """All is not well, and what a run presses is not to be judged."""
         self.is_disturbed, self._changed_s = True, self.rig.now()
         if run := self.laws.run:
             run.is_odd, run.flaws = True, ()
@@ -124,8 +142,9 @@ class Judge:
             self.complain(f"{code.code} is not in the log: {said}")
         if state is State.FAULT and not self.is_disturbed:
             self.complain(f"{said} though nothing has happened")
-        if state is State.FAULT and not self.befallen.intersection(CAUSES.get(code, self.befallen or {""})):
-            self.complain(f"{said} though only {sorted(self.befallen)} has happened")
+        lately = {kind for kind, until_s in self.befallen.items() if rig.now() <= until_s + TOLD_S}
+        if state is State.FAULT and code in CAUSES and not lately.intersection(CAUSES[code]):
+            self.complain(f"{said} though only {sorted(lately)} has happened lately")
         if state not in ON and before in ON:
             if (rig.word("control_word"), rig.word("force_setpoint")) != (0, 0):
                 self.complain(f"control_word {rig.word('control_word')} stands behind the end")

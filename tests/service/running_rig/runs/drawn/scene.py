@@ -49,6 +49,8 @@ class Scene:
         if self.is_followed and rig.ticks % FOLLOWS_TICKS == 0:
             rig.runs.answer({})
             self.laws.followed_s = rig.now()
+        if self.judge.is_disturbed and self.judge.is_over and self.is_well:
+            self.judge.is_disturbed = False
         if rig.ticks % 10 == 0:
             for master in MASTERS:
                 if master.host in self.beating and rig.bank.owner == master.host:
@@ -138,6 +140,11 @@ class Scene:
             and is_right
         )
 
+    @property
+    def is_well(self) -> bool:
+        """Whether all is as it was made, and everybody is there."""
+        return self.is_whole and self.rig.wire.how == "well" and len(self.beating) == len(MASTERS)
+
     # -- the scene
 
     def play(self) -> "Scene":
@@ -162,7 +169,8 @@ class Scene:
             events.heal(self)
             self.rig.run(1.5)
             if acts.reset(self):
-                self.judge.is_disturbed = not self.is_whole or len(self.beating) < len(MASTERS)
+                events.note_reset(self)
+                self.judge.is_disturbed = not self.is_well
         elif state is State.CALIBRATING:
             draw.choice((acts.stop, acts.stop, acts.meddle, acts.press, events.befall, events.befall))(self)
         elif state is State.OFF and draw.random() < 0.7:
@@ -175,6 +183,7 @@ class Scene:
         rig, judge = self.rig, self.judge
         events.heal(self)
         self.is_followed, self.beating = False, set(self.beats)
+        judge.note_end("hangs")
         self.write(OWNER, 0, 0, name="switches off")
         rig.run(5.0)
         self.write(OWNER, 0, TAKE, name="takes over")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,6 +15,7 @@ from gateway.registers.words import CalibrationPhase, SelfTestResult, SelfTestVe
 from tests.control.bench import settings
 from tests.service.running_rig.runs.drawn.judge import Judge
 from tests.service.running_rig.runs.drawn.run_laws import ITEMS, Asked
+from tests.service.running_rig.runs.drawn.scene import Scene
 from tests.service.running_rig.simulated_rig import OWNER, TICK_S
 
 RUNS, OFF, FAULT, HOLDS = State.CALIBRATING, State.OFF, State.FAULT, State.HOLDING
@@ -140,6 +142,13 @@ def stopped_at_once(shown: Shown) -> None:
     shown.laws.stopped(shown.laws.run, RUNS, at_once=True)
 
 
+def long_over(shown: Shown) -> None:
+    """Each fault of a scene was excused by what had befallen the rig at any time before it."""
+    shown.begun().judge.note_event("cell silent", lasts=True)
+    shown.tick(50).judge.note_end("cell")
+    shown.tick(60).failed(befallen="")
+
+
 def owned(shown: Shown) -> None:
     shown.begun().rig.bank.owner = "10.0.0.9"
     shown.tick(1, OFF)
@@ -157,7 +166,8 @@ OUTPUT_LAWS: list[tuple[str, Callable[[Shown], object]]] = [
     ("an internal error", lambda shown: shown.begun().failed(said=f"{STALE.code} A499")),
     ("is not in the log", lambda shown: shown.begun().failed(said="")),
     ("though nothing has happened", lambda shown: shown.begun().failed(befallen="")),
-    ("though only ['cell silent']", lambda shown: shown.begun().failed(FaultCode.OUTPUT_REFUSED)),
+    ("though only ['cell silent'] has happened lately", lambda shown: shown.begun().failed(FaultCode.OUTPUT_REFUSED)),
+    ("though only [] has happened lately", long_over),
     ("control_word 1 stands behind", lambda shown: shown.begun().tick(1, OFF, control_word=1)),
     ("10.0.0.9 owns it", owned),
     ("without a reading", lambda shown: shown.begun().having(is_silent=True).tick(30)),
@@ -213,6 +223,37 @@ def test_an_item_that_passes_with_a_tool_that_is_not_well_is_seen(wrong: str, it
     shown = Shown()
     shown.tested(SelfTestResult.PASSED, wrong=(wrong,))
     assert any(f"passed though {wrong} is wrong" in broken and item in broken for broken in shown.judge.broken)
+
+
+@pytest.mark.parametrize("lasts_ticks", [1, 40])
+def test_what_lasts_or_is_just_over_may_be_told_of(lasts_ticks: int) -> None:
+    shown = Shown()
+    shown.begun().judge.note_event("cell silent", lasts=True)
+    shown.tick(200)
+    if lasts_ticks > 1:
+        shown.judge.note_end("cell")
+    shown.tick(lasts_ticks).failed(befallen="")
+    assert shown.judge.broken == []
+
+
+def test_what_is_over_disturbs_no_longer_and_what_lasts_does(tmp_path: Path) -> None:
+    """A fault behind it, of which nobody has asked for a reset before, was excused for the rest of the scene."""
+    scene = Scene(1, tmp_path)
+    scene.judge.note_event("killed")
+    scene.rig.run(0.4)
+    assert scene.judge.is_disturbed
+    scene.rig.run(0.2)
+    assert not scene.judge.is_disturbed
+    for ill in ("refuses", "away"):
+        scene.judge.note_event(f"output {ill}", lasts=True)
+        scene.rig.wire.how = ill
+        scene.rig.run(1.0)
+        assert scene.judge.is_disturbed
+        scene.rig.wire.how = "well"
+        scene.judge.note_end("output")
+        scene.rig.run(0.6)
+        assert not scene.judge.is_disturbed
+    scene.rig.let_go()
 
 
 @pytest.mark.parametrize(
