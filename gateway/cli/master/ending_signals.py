@@ -96,4 +96,4 @@ def handle_ends(handler: Callable[[int, Any], Any], always: tuple[int, ...] = ()
         yield
     finally:
         for number, own in before.items():
-            signal.signal(number, own)
+            signal.signal(number, own or signal.SIG_DFL)  # None: a handler of C, such as that of PYTHONDEVMODE
