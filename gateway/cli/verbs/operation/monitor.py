@@ -1,9 +1,8 @@
 """`monitor`: what the gateway does, live in a terminal, by Modbus; or one frame as text or picture."""
 
-import os
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -11,6 +10,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, state_option
+from gateway.cli.terminal import can_write_over
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -48,18 +48,13 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
         poller = Poller(client, WriterSource(lambda: _find_state(wire, options["state"])), time.monotonic)
         with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
-        if svg or options["once"] or not _draws_anew(sys.stdout):
+        if svg or options["once"] or not can_write_over(sys.stdout):
             _watch(poller, seconds or 0.0)
             _picture(poller, svg) if svg else _text(poller)
             if poller.trouble:  # it stands in the frame, too; who asks for one frame may look at the exit code alone
                 raise CliError(poller.trouble, exit_codes.DEVICE)
         else:
             _live(poller, seconds)
-
-
-def _draws_anew(stream: TextIO) -> bool:
-    """Decide whether a frame can be drawn over the one before it: a dumb terminal (in Emacs) shows the orders to do so."""
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def _find_state(wire: "Wire", given: Path | None) -> tuple[Path | None, str]:
