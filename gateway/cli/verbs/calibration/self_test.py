@@ -207,10 +207,9 @@ class _SelfTest:
 def _ask_gateway(wire: "Wire", number: int) -> dict[str, Any]:
     """Return the items as the gateway itself tells them, where it is on this machine."""
     from gateway.cli.control_socket import ask
-    from gateway.cli.master.local_gateways import sockets_near
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import sockets_near, usual_root
 
-    for directory in sockets_near(wire, default_state_root()):
+    for directory in sockets_near(wire, usual_root()):
         try:
             if wire.is_served_by(ask(directory, {"do": "running"})):
                 told = ask(directory, {"do": "self-test"})

@@ -105,10 +105,9 @@ def _read_rig_lease(rig: str) -> "KnownLease":
 def _find_gateway_lease(wire: "Wire") -> "KnownLease | None":
     """Return the lease of the gateway behind this wire, where it runs on this machine; None where it is not known."""
     from gateway.cli.force_hold.heartbeat import KnownLease
-    from gateway.cli.master.local_gateways import running_behind
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import running_behind, usual_root
 
-    answer = running_behind(wire, default_state_root())
+    answer = running_behind(wire, usual_root())
     if answer is None or not {"lease_s", "lease_action"} <= answer.keys():
         return None
     return KnownLease(answer["lease_s"], str(answer["lease_action"]))

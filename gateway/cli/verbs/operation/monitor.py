@@ -59,10 +59,9 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
 
 def _find_state(wire: "Wire", given: Path | None) -> tuple[Path | None, str]:
     """Return the gateway's state directory; without one, why."""
-    from gateway.cli.master.local_gateways import find_state_behind
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import find_state_behind, usual_root
 
-    return (given, "") if given else find_state_behind(wire, default_state_root())
+    return (given, "") if given else find_state_behind(wire, usual_root())
 
 
 def _watch(poller: "Poller", seconds: float) -> None:
