@@ -7,7 +7,6 @@ settings would be forgotten at its close.
 import contextlib
 import fcntl
 import os
-import pty
 import struct
 import tty
 from typing import Final
@@ -22,7 +21,7 @@ class Pty:
     """Opened when made; `close` is an unplug for the client."""
 
     def __init__(self) -> None:
-        self.fd, self._slave = pty.openpty()
+        self.fd, self._slave = os.openpty()  # that of `pty` hides the kernel's reason
         self.path = os.ttyname(self._slave)
         tty.setraw(self._slave)
         os.set_blocking(self.fd, False)

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from gateway.devices import DeviceProfile
-from gateway.plain_file import tell_place_and_refusal
+from gateway.plain_file import tell_place_and_refusal, tell_refusal
 from gateway.ports import PacedPty
 from gateway.processes import exit_codes
 from gateway.processes import message_link as guardian_link
@@ -38,6 +38,10 @@ from gateway.service.simulation.world import SimulatedRig
 _KEPT_S: Final = 1.0  # of a stream that nobody reads, in a driver
 _LAST_WORDS_S: Final = 0.5  # longer than control takes to its last write and the answer
 _UNPLUGS: Final = {"output": "output.unplug", "load_cell": "cell.unplug", "valve": "valve.unplug"}
+
+
+class NoPseudoTerminalError(Exception):
+    """The kernel has none for a line, and says why."""
 
 
 class SimulatedLines:
@@ -62,9 +66,12 @@ class SimulatedLines:
         self._tick = ClockTick(1.0 / self._rate_hz, self._on_tick) if self._rate_hz else None
 
     def open(self) -> None:
-        """Open all ports, and begin to stream."""
-        for pty in self._ptys.values():
-            pty.open()
+        """Open all ports, and begin to stream; NoPseudoTerminalError where there is none for one of them."""
+        try:
+            for pty in self._ptys.values():
+                pty.open()
+        except OSError as error:
+            raise NoPseudoTerminalError(tell_refusal(error)) from error
         if self._tick:
             self._tick.start()
 
@@ -213,7 +220,14 @@ def main(arguments: list[str]) -> int:
         except ProfileError as error:  # edited since
             log("rig", "E151 the rig file has faults:\n" + "\n".join(map(str, error.faults)))
             return exit_codes.CONFIGURATION
-        asyncio.run(_serve_process(rig, link, kept, log))
+        try:
+            asyncio.run(_serve_process(rig, link, kept, log))
+        except NoPseudoTerminalError as error:
+            log(
+                "rig",
+                f"E106 no pseudo-terminal for the simulated lines: {error} (ls -l /dev/ptmx; mount | grep devpts)",
+            )
+            return exit_codes.DEVICE
     return 0
 
 

@@ -3,7 +3,6 @@ that is rewritten on a terminal, else a line for each stage; and a Ctrl-C that e
 the set-up shows itself by it before anything is installed.
 """
 
-import os
 import select
 import shutil
 import signal
@@ -15,6 +14,7 @@ from contextlib import contextmanager, redirect_stdout
 from types import FrameType
 from typing import IO, Any, Final
 
+from gateway.cli.terminal import can_write_over
 from gateway.progress import Progress, listen
 
 _QUIET_S: Final = 1.0  # what is shorter needs no words
@@ -46,7 +46,7 @@ class ProgressLine:
     def __init__(self, task: str, stream: IO[str], clock: Callable[[], float] = time.monotonic) -> None:
         self._task = task
         self._stream = stream
-        self._is_terminal = stream.isatty() and os.environ.get("TERM") != "dumb"
+        self._is_terminal = can_write_over(stream)
         self._clock = clock
         self._began_s = clock()
         self._progress = Progress("")

@@ -7,6 +7,7 @@ from math import isnan
 from typing import Any, Final
 
 from gateway.cli.force_hold.sequence import StatusReading
+from gateway.cli.terminal import can_write_over
 from gateway.codes.warning_bits import WarningBit
 from gateway.registers.words import LimitedBy, State, StatusBit
 
@@ -67,7 +68,7 @@ class StateLine:
 
     def __init__(self, *, as_json: bool) -> None:
         self._as_json = as_json
-        self._is_live = sys.stdout.isatty() and not as_json
+        self._is_live = can_write_over(sys.stdout) and not as_json
         self._last_s, self._last_kind = -_PLAIN_S, ()
 
     def show(self, status: StatusReading, time_s: float) -> None:

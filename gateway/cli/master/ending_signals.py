@@ -1,4 +1,5 @@
-"""What ends a verb from outside while the gateway presses for it: Ctrl-C, Ctrl-\\, SIGTERM, a closed terminal (not with nohup).
+"""What ends a verb from outside while the gateway presses for it: Ctrl-C, Ctrl-\\, Ctrl-Z, SIGTERM, a closed terminal (not with
+nohup), and whatever else would end or suspend this process: nobody would watch the force then, and without a lease it went on.
 
 All come as KeyboardInterrupt, so that who has begun something stops it, and not at once while a request is under way: one that
 is cut in the middle may have begun what nobody would stop.
@@ -11,13 +12,30 @@ from typing import Any, Final
 
 from gateway.service.supervisor.event_wait import StopSignals
 
-_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+_ENDING: Final = (
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGHUP,
+    signal.SIGQUIT,
+    signal.SIGTSTP,
+    signal.SIGABRT,  # of a C library's own abort Python dies nevertheless
+    signal.SIGALRM,
+    signal.SIGVTALRM,
+    signal.SIGPROF,
+    signal.SIGUSR1,
+    signal.SIGUSR2,
+    signal.SIGPOLL,
+    signal.SIGPWR,
+    signal.SIGXCPU,  # `ulimit -t`
+    signal.SIGSTKFLT,
+    *range(signal.SIGRTMIN, signal.SIGRTMAX + 1),
+)
 
 
 @contextmanager
 def signals_as_ctrl_c() -> Iterator[None]:
     """Have every end from outside raise KeyboardInterrupt."""
-    with _handled_by(signal.default_int_handler):
+    with handle_ends(signal.default_int_handler):
         yield
 
 
@@ -26,7 +44,7 @@ def watch_to_the_end(begin: Callable[[], None], watch: Callable[[], None], stop:
     stopped then. One end may say its signal twice, and the second one, close behind the first, must not take the place of the
     stop."""
     ending = _FirstOfAll()
-    with _handled_by(ending):
+    with handle_ends(ending):
         try:
             begin()
             ending.raise_from_now_on()
@@ -65,13 +83,17 @@ class _FirstOfAll:
 
 
 @contextmanager
-def _handled_by(handler: Callable[[int, Any], Any]) -> Iterator[None]:
-    before = {number: signal.getsignal(number) for number in _ENDING}
-    heard = [number for number, own in before.items() if own is not signal.SIG_IGN]  # nohup, a job in the background
-    for number in heard:
-        signal.signal(number, handler)
+def handle_ends(handler: Callable[[int, Any], Any], always: tuple[int, ...] = ()) -> Iterator[None]:
+    """Give every end from outside to this handler, but what was ignored before (nohup, a background job) unless it is one
+    of `always`. A job in the background that may not write to its terminal (`stty tostop`) writes: it would be suspended."""
+    before = {number: signal.getsignal(number) for number in (*_ENDING, signal.SIGTTOU)}
+    for number, own in before.items():
+        if number == signal.SIGTTOU:
+            signal.signal(number, signal.SIG_IGN)
+        elif number in always or own is not signal.SIG_IGN:
+            signal.signal(number, handler)
     try:
         yield
     finally:
-        for number in heard:
-            signal.signal(number, before[number])
+        for number, own in before.items():
+            signal.signal(number, own or signal.SIG_DFL)  # None: a handler of C, such as that of PYTHONDEVMODE

@@ -9,16 +9,27 @@ from gateway.cli.master.wires import TcpWire, Wire
 from gateway.plain_file import is_file
 
 
-def sockets_near(wire: Wire, root: Path) -> list[Path]:
+def usual_root() -> Path | None:
+    """Return where this user's gateways keep their state; None where he has no home, as in a container by a number alone: what
+    goes by Modbus needs none."""
+    from gateway.service.supervisor.run_options import default_state_root
+
+    try:
+        return default_state_root()
+    except FileNotFoundError:
+        return None
+
+
+def sockets_near(wire: Wire, root: Path | None) -> list[Path]:
     """Find state directories below root with a control socket, none where the wire leads to another machine, or where another
     user keeps them to himself."""
     try:
-        return sorted(path.parent for path in root.glob("*/control.sock")) if wire.is_near else []
+        return sorted(path.parent for path in root.glob("*/control.sock")) if root and wire.is_near else []
     except PermissionError:
         return []
 
 
-def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
+def running_behind(wire: Wire, root: Path | None) -> dict[str, Any] | None:
     """Return what the gateway behind this wire says of itself (`running`); None where it is elsewhere, nobody says, or two
     do."""
     directory, _ = find_state_behind(wire, root)
@@ -27,25 +38,22 @@ def running_behind(wire: Wire, root: Path) -> dict[str, Any] | None:
 
 def tell_running(wire: Wire) -> str:
     """Return which gateways of this user run on other ports of this machine, for who found none behind this wire."""
-    from gateway.service.supervisor.run_options import default_state_root
-
     if not isinstance(wire, TcpWire):
         return ""
-    running = [_ask_what_runs(directory) for directory in sockets_near(wire, default_state_root())]
+    running = [_ask_what_runs(directory) for directory in sockets_near(wire, usual_root())]
     told = [f"{one['rig']} on port {one['port']}" for one in running if one.get("rig") and one.get("port")]
     return f"; here run {', '.join(told)}" if len(told) > 1 else f"; here runs {told[0]}" if told else ""
 
 
-def find_state_behind(wire: Wire, root: Path) -> tuple[Path | None, str]:
+def find_state_behind(wire: Wire, root: Path | None) -> tuple[Path | None, str]:
     """Return the state directory of the gateway behind this wire; where it is not known, why, in words."""
     if not wire.is_near:
         return None, "last writers: only where the gateway runs on this machine"
     found = [directory for directory in sockets_near(wire, root) if wire.is_served_by(_ask_what_runs(directory))]
     if len(found) == 1:
         return found[0], ""
-    why = (
-        f"no gateway of this user below {root} says that it serves {wire.where}" if not found else "two gateways say so"
-    )
+    below = f"below {root}" if root else "(who has no home directory)"
+    why = f"no gateway of this user {below} says that it serves {wire.where}" if not found else "two gateways say so"
     return None, f"last writers: {why}; --state DIR names its directory"
 
 

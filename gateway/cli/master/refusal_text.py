@@ -81,10 +81,9 @@ def _known_state(client: GatewayClient, reason: RefusalReason) -> str:
 def _own_sentence(client: GatewayClient, address: int, reason: RefusalReason, state: Path | None) -> str:
     """Return what the gateway itself has said to this refusal; empty where it is elsewhere, or nobody answers."""
     from gateway.cli.control_socket import ask
-    from gateway.cli.master.local_gateways import sockets_near
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import sockets_near, usual_root
 
-    states = [state] if state else sockets_near(client.wire, default_state_root())
+    states = [state] if state else sockets_near(client.wire, usual_root())
     for directory in states:
         try:
             sentence = ask(directory, {"do": "last-refusal"})

@@ -32,8 +32,14 @@ def print_ready(what: str | dict[str, Any]) -> None:
     text = (what if isinstance(what, str) else json.dumps(what)) + "\n"
     is_written = threading.Event()
     with contextlib.suppress(RuntimeError):  # no thread is to be had: nor is READY then
-        _thread.start_new_thread(_write_out, (text.encode(errors="replace"), is_written))
+        _thread.start_new_thread(_write_out, (_encode_for_stdout(text), is_written))
         is_written.wait(_PATIENCE_S)
+
+
+def _encode_for_stdout(text: str) -> bytes:
+    """Return the text in the terminal's own encoding (PYTHONIOENCODING, a Latin-1 locale): else its dots are not dots."""
+    encoding, errors = getattr(sys.stdout, "encoding", None), getattr(sys.stdout, "errors", None)
+    return text.encode(encoding or "utf-8", "replace" if errors in (None, "strict") else errors)
 
 
 def _write_out(data: bytes, is_written: threading.Event) -> None:

@@ -3,8 +3,10 @@
 import errno
 import json
 import os
+import sys
 import threading
 from dataclasses import replace
+from io import StringIO
 from types import SimpleNamespace
 from typing import Any
 
@@ -155,3 +157,14 @@ def test_a_warning_that_comes_is_a_line_at_once_where_there_is_no_terminal(capsy
     for at_s, warnings in ((0.0, 0), (0.1, 0), (0.2, 1 << 2), (0.3, 1 << 2)):
         line.show(replace(PRESSING, warnings=WarningBit(warnings)), at_s)
     assert [one.split()[0] for one in capsys.readouterr().out.splitlines()] == ["0.0", "0.2"]
+
+
+@pytest.mark.parametrize(("term", "is_live"), [("xterm", True), ("dumb", False)])
+def test_a_dumb_terminal_gets_the_lines_of_a_pipe(term: str, is_live: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In Emacs it showed the orders to write over the line, ten times a second, in one line without an end."""
+    monkeypatch.setenv("TERM", term)
+    with StringIO() as terminal:
+        monkeypatch.setattr(terminal, "isatty", lambda: True)
+        monkeypatch.setattr(sys, "stdout", terminal)
+        StateLine(as_json=False).show(PRESSING, 0.0)
+        assert ("\x1b" in terminal.getvalue(), terminal.getvalue().endswith("\n")) == (is_live, not is_live)

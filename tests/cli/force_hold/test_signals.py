@@ -30,13 +30,18 @@ def test_a_closed_terminal_ends_a_hold_unless_nohup_says_otherwise(is_ignored: b
         signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTSTP, signal.SIGQUIT, signal.SIGXCPU])
+HARMLESS = {signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH}
+DEFECTS = {signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGTRAP, signal.SIGSYS}
+OWN = {signal.SIGHUP, signal.SIGINT, signal.SIGTERM, signal.SIGTTIN, signal.SIGTTOU}  # other tests
+IGNORED_BY_PYTHON = {signal.SIGPIPE, signal.SIGXFSZ}
+OTHERS = signal.valid_signals() - HARMLESS - DEFECTS - OWN - IGNORED_BY_PYTHON - {signal.SIGKILL, signal.SIGSTOP}
+
+
+@pytest.mark.parametrize("number", sorted(OTHERS))
 @pytest.mark.parametrize(("is_ignored", "stops"), [(False, True), (True, False)])
-def test_a_hold_that_would_be_suspended_or_killed_lets_go_instead(
-    is_ignored: bool, stops: bool, number: signal.Signals
-) -> None:
-    """Behind Ctrl-Z, Ctrl-\\ and the end of `ulimit -t` the tool pressed on, where the rig has no lease, and nobody watched it;
-    with one it was a fault A310."""
+def test_a_hold_that_would_be_suspended_or_killed_lets_go_instead(is_ignored: bool, stops: bool, number: int) -> None:
+    """Behind Ctrl-Z, Ctrl-\\, the end of `ulimit -t` and the signal of a timer or a stranger the tool pressed on, where the rig
+    has no lease, and nobody watched it; with one it was a fault A310."""
     beat: Any = SimpleNamespace(stopping=threading.Event(), dropping=threading.Event(), is_alive=lambda: True)
     suspended = threading.Event()
     handler = signal.SIG_IGN if is_ignored else lambda *_: suspended.set()

@@ -24,7 +24,7 @@ from gateway.cli.master.client import GatewayClient
 from gateway.cli.master.local_gateways import find_state_behind
 from gateway.cli.master.value_text import format_value
 from gateway.cli.master.wires import TcpWire
-from gateway.cli.verbs.operation import monitor
+from gateway.cli.terminal import can_write_over
 from gateway.codes.all_codes import CATALOGUE
 from gateway.codes.faults import FaultCode
 from gateway.codes.warning_bits import WarningBit
@@ -152,4 +152,4 @@ def test_a_dumb_terminal_gets_one_frame_as_a_pipe_does(term: str, draws: bool, m
     monkeypatch.setenv("TERM", term)
     with StringIO() as pipe, StringIO() as terminal:
         monkeypatch.setattr(terminal, "isatty", lambda: True)
-        assert (monitor._draws_anew(terminal), monitor._draws_anew(pipe)) == (draws, False)
+        assert (can_write_over(terminal), can_write_over(pipe)) == (draws, False)

@@ -8,7 +8,11 @@ import pytest
 
 from gateway.cli.master.ending_signals import signals_as_ctrl_c, watch_to_the_end
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+ENDING = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP, signal.SIGABRT, signal.SIGALRM),
+    *(signal.SIGVTALRM, signal.SIGPROF, signal.SIGUSR1, signal.SIGUSR2, signal.SIGPOLL, signal.SIGPWR, signal.SIGXCPU),
+    *(signal.SIGSTKFLT, int(signal.SIGRTMIN), int(signal.SIGRTMAX)),
+)
 
 
 @pytest.fixture(autouse=True)
@@ -21,7 +25,7 @@ def handlers() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_every_end_from_outside_comes_as_ctrl_c_and_is_then_as_it_was(number: signal.Signals) -> None:
+def test_every_end_from_outside_comes_as_ctrl_c_and_is_then_as_it_was(number: int) -> None:
     before = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt), signals_as_ctrl_c():
         signal.raise_signal(number)
@@ -29,7 +33,7 @@ def test_every_end_from_outside_comes_as_ctrl_c_and_is_then_as_it_was(number: si
 
 
 @pytest.mark.parametrize("number", ENDING)
-def test_a_request_that_is_under_way_is_ended_behind_it(number: signal.Signals) -> None:
+def test_a_request_that_is_under_way_is_ended_behind_it(number: int) -> None:
     done: list[str] = []
 
     def begin() -> None:
@@ -42,7 +46,7 @@ def test_a_request_that_is_under_way_is_ended_behind_it(number: signal.Signals) 
 
 @pytest.mark.parametrize("number", ENDING)
 def test_a_signal_that_is_said_twice_does_not_take_the_place_of_the_stop(
-    number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+    number: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`timeout`, and a terminal that closes, say it again at once: in 3 of 60 runs it came while the stop was prepared, nothing
     was stopped, and the tool went on pressing."""
@@ -75,6 +79,13 @@ def test_what_was_ignored_before_stays_so() -> None:
         assert not watch_to_the_end(lambda: go_on("request"), lambda: go_on("watched"), lambda: done.append("stopped"))
         go_on("what goes on")
     assert done == ["request", "watched", "what goes on"]
+
+
+def test_a_job_in_the_background_may_write_to_its_terminal() -> None:
+    """Where that is forbidden (`stty tostop`) it was suspended, and the tool pressed on."""
+    with signals_as_ctrl_c():
+        assert signal.getsignal(signal.SIGTTOU) is signal.SIG_IGN
+    assert signal.getsignal(signal.SIGTTOU) is signal.SIG_DFL
 
 
 def test_neither_the_beginning_nor_the_stop_is_cut_in_the_middle() -> None:

@@ -118,6 +118,18 @@ def test_directories_of_another_user_are_passed_over(tmp_path: Path, monkeypatch
     assert local_gateways.sockets_near(TcpWire("127.0.0.1", 5020), tmp_path) == []
 
 
+def test_a_user_without_a_home_has_no_gateways_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a container by a number alone `hold`, `read` and `self-test` ended with E106, although they had the address."""
+
+    def refuse() -> Path:
+        raise RuntimeError
+
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", refuse)
+    wire, root = TcpWire("127.0.0.1", 5020), local_gateways.usual_root()
+    assert (root, local_gateways.running_behind(wire, root), local_gateways.tell_running(wire)) == (None, None, "")
+
+
 @pytest.mark.parametrize(
     ("low_n", "high_n", "said"),
     [

@@ -1,6 +1,7 @@
 """The simulated rig's process from its arguments on: what it keeps, how it ends, and whose bytes are whose."""
 
 import asyncio
+import errno
 import json
 import os
 import signal
@@ -53,6 +54,21 @@ def test_a_rig_file_that_was_edited_since_is_no_internal_error(
     assert simulated_rig.main(arguments) == exit_codes.CONFIGURATION
     with pytest.raises(OSError, match="Bad file descriptor"):
         os.fstat(int(arguments[0]))
+
+
+def test_a_machine_without_pseudo_terminals_is_told_so(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As in a chroot or container without /dev/pts: four tracebacks without the kernel's reason, and `exit 1`."""
+
+    def refuse() -> None:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))
+
+    monkeypatch.setattr(os, "openpty", refuse)
+    assert simulated_rig.main(arguments) == exit_codes.DEVICE
+    told = capfd.readouterr().err
+    assert "E106 no pseudo-terminal for the simulated lines: No such file or directory" in told
+    assert "Traceback" not in told
 
 
 def test_a_stop_that_every_process_is_told_leaves_it_to_the_ramp_and_the_end_of_its_line_ends_it(

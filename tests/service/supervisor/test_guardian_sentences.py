@@ -27,6 +27,17 @@ def test_a_reader_that_has_gone_does_not_end_the_guardian():
     assert done.returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("encoding", "said"), [("utf-8", "·"), ("latin-1", "·"), ("ascii", "?"), ("ascii:backslashreplace", "\\xb7")]
+)
+def test_ready_is_spelled_as_the_terminal_spells(encoding, said):
+    """It was UTF-8 on every terminal: its dots were two other characters where a terminal is Latin-1."""
+    code = "from gateway.service.supervisor.guardian_sentences import print_ready; print_ready('READY \\xb7 \\udcff 8')"
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    printed = subprocess.run([sys.executable, "-c", code], stdout=PIPE, env=environment, check=True).stdout
+    assert printed.decode(encoding.partition(":")[0]).startswith(f"READY {said}")
+
+
 @pytest.mark.parametrize("is_read", [True, False])
 def test_a_reader_that_reads_nothing_is_not_waited_for(is_read):
     """A terminal that is paused while the gateway starts: the guardian has another work; READY comes once it is read."""

@@ -9,6 +9,7 @@ import click
 
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, json_option
+from gateway.cli.terminal import can_write_over
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def command(*, wire: "Wire", unit: int, map_name: str, as_json: bool) -> None:
         with explain_refusals(client):
             client.check_map()
             run = _SelfTest(client)
-        _run_to_its_end(run, shows=sys.stderr.isatty() and not as_json)
+        _run_to_its_end(run, shows=can_write_over(sys.stderr) and not as_json)
         with explain_refusals(client):
             answer = run.answer(wire)
             why = run.tell_fault() if answer["result"] in ("stopped", "failed") else ""
@@ -206,10 +207,9 @@ class _SelfTest:
 def _ask_gateway(wire: "Wire", number: int) -> dict[str, Any]:
     """Return the items as the gateway itself tells them, where it is on this machine."""
     from gateway.cli.control_socket import ask
-    from gateway.cli.master.local_gateways import sockets_near
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import sockets_near, usual_root
 
-    for directory in sockets_near(wire, default_state_root()):
+    for directory in sockets_near(wire, usual_root()):
         try:
             if wire.is_served_by(ask(directory, {"do": "running"})):
                 told = ask(directory, {"do": "self-test"})

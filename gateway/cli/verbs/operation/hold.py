@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from gateway.cli.master.wires import Wire
 
 _SHOW_S: Final = 0.1
-_HEARD_UNLESS_IGNORED: Final = (signal.SIGHUP, signal.SIGTSTP, signal.SIGQUIT, signal.SIGXCPU)
+_ALWAYS_HEARD: Final = (signal.SIGINT, signal.SIGTERM)  # a script's job in the background begins with SIGINT ignored
 
 
 def _parse_time(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
@@ -106,10 +106,9 @@ def _read_rig_lease(rig: str) -> "KnownLease":
 def _find_gateway_lease(wire: "Wire") -> "KnownLease | None":
     """Return the lease of the gateway behind this wire, where it runs on this machine; None where it is not known."""
     from gateway.cli.force_hold.heartbeat import KnownLease
-    from gateway.cli.master.local_gateways import running_behind
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import running_behind, usual_root
 
-    answer = running_behind(wire, default_state_root())
+    answer = running_behind(wire, usual_root())
     if answer is None or not {"lease_s", "lease_action"} <= answer.keys():
         return None
     return KnownLease(answer["lease_s"], str(answer["lease_action"]))
@@ -156,9 +155,10 @@ def _show_until_end(beat: "HeartbeatThread", for_s: float | None, *, as_json: bo
 
 @contextmanager
 def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.monotonic) -> Iterator[None]:
-    """The first of Ctrl-C, Ctrl-Z, Ctrl-\\, SIGTERM, a closed terminal (not with nohup) and used up time (`ulimit -t`) ramps
+    """The first of Ctrl-C, Ctrl-Z, SIGTERM, a closed terminal (not with nohup) and of whatever would end or suspend us ramps
     down, a second one but a closed terminal drops the force at once; where none is held any more it ends us. Suspended by
     Ctrl-Z nobody would watch a force that goes on, and its heartbeat would stand still."""
+    from gateway.cli.master.ending_signals import handle_ends
     from gateway.service.supervisor.event_wait import StopSignals
 
     stops = StopSignals(clock)
@@ -172,14 +172,8 @@ def _handle_signals(beat: "HeartbeatThread", clock: Callable[[], float] = time.m
         else:
             (beat.dropping if beat.stopping.is_set() and number != signal.SIGHUP else beat.stopping).set()
 
-    heard = [signal.SIGINT, signal.SIGTERM]
-    heard += [each for each in _HEARD_UNLESS_IGNORED if signal.getsignal(each) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, on_signal) for number in heard}
-    try:
+    with handle_ends(on_signal, always=_ALWAYS_HEARD):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _report_end(beat: "HeartbeatThread", where: str, *, as_json: bool) -> None:

@@ -1,9 +1,8 @@
 """`monitor`: what the gateway does, live in a terminal, by Modbus; or one frame as text or picture."""
 
-import os
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -11,6 +10,7 @@ from gateway.cli.command_line.given_path import GivenPath
 from gateway.cli.command_line.numbers import Quantity
 from gateway.cli.errors import CliError
 from gateway.cli.options import gateway_options, state_option
+from gateway.cli.terminal import can_write_over
 from gateway.processes import exit_codes
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
         poller = Poller(client, WriterSource(lambda: _find_state(wire, options["state"])), time.monotonic)
         with explain_refusals(client):
             poller.poll()  # the first one fails loudly: a wrong address is no reason to wait
-        if svg or options["once"] or not _draws_anew(sys.stdout):
+        if svg or options["once"] or not can_write_over(sys.stdout):
             _watch(poller, seconds or 0.0)
             _picture(poller, svg) if svg else _text(poller)
             if poller.trouble:  # it stands in the frame, too; who asks for one frame may look at the exit code alone
@@ -57,17 +57,11 @@ def command(*, svg: Path | None, seconds: float | None, wire: "Wire", **options:
             _live(poller, seconds)
 
 
-def _draws_anew(stream: TextIO) -> bool:
-    """Decide whether a frame can be drawn over the one before it: a dumb terminal (in Emacs) shows the orders to do so."""
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
-
-
 def _find_state(wire: "Wire", given: Path | None) -> tuple[Path | None, str]:
     """Return the gateway's state directory; without one, why."""
-    from gateway.cli.master.local_gateways import find_state_behind
-    from gateway.service.supervisor.run_options import default_state_root
+    from gateway.cli.master.local_gateways import find_state_behind, usual_root
 
-    return (given, "") if given else find_state_behind(wire, default_state_root())
+    return (given, "") if given else find_state_behind(wire, usual_root())
 
 
 def _watch(poller: "Poller", seconds: float) -> None:
