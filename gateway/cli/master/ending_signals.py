@@ -12,23 +12,14 @@ from typing import Any, Final
 
 from gateway.service.supervisor.event_wait import StopSignals
 
+_NAMES: Final = (
+    *("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGABRT", "SIGALRM", "SIGVTALRM", "SIGPROF"),
+    *("SIGUSR1", "SIGUSR2", "SIGIO", "SIGPWR", "SIGSTKFLT", "SIGXCPU"),
+)
+"""SIGABRT: of a C library's own abort Python dies nevertheless. SIGXCPU: `ulimit -t`."""
 _ENDING: Final = (
-    signal.SIGINT,
-    signal.SIGTERM,
-    signal.SIGHUP,
-    signal.SIGQUIT,
-    signal.SIGTSTP,
-    signal.SIGABRT,  # of a C library's own abort Python dies nevertheless
-    signal.SIGALRM,
-    signal.SIGVTALRM,
-    signal.SIGPROF,
-    signal.SIGUSR1,
-    signal.SIGUSR2,
-    signal.SIGPOLL,
-    signal.SIGPWR,
-    signal.SIGXCPU,  # `ulimit -t`
-    signal.SIGSTKFLT,
-    *range(signal.SIGRTMIN, signal.SIGRTMAX + 1),
+    *(number for number in signal.Signals if number.name in _NAMES),  # a machine other than Linux has fewer
+    *range(getattr(signal, "SIGRTMIN", 0), getattr(signal, "SIGRTMAX", -1) + 1),
 )
 
 
