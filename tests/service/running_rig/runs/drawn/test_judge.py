@@ -182,7 +182,7 @@ RUN_LAWS: list[tuple[str, Callable[[Shown], object]]] = [
     ("status_word is", lambda shown: shown.begun("calibration").tick(10, status_word=0)),
     ("self_test_result is 4", lambda shown: shown.begun("calibration").tick(10, self_test_result=4)),
     ("15 N are stated", lambda shown: shown.begun("self-test").tick(1, volts=2.0).tick(1, volts=4.0)),
-    ("30.0 N press, 15 N", lambda shown: shown.begun("self-test").having(force_n=30.0).tick()),
+    ("30.0 N press, 15 N", lambda shown: shown.begun("self-test").having(force_n=30.0).tick(1, volts=0.5)),
     ("though the sign is wrong", lambda shown: shown.having(sign=-1.0).begun("calibration").having(force_n=13.0).tick()),
     ("for longer than 4 s", lambda shown: shown.begun("calibration").stopped().tick(420)),
     ("behind a stop", lambda shown: shown.begun("calibration").tick().stopped().tick().tick(2, volts=0.5)),
