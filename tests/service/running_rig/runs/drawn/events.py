@@ -63,6 +63,8 @@ def output(scene: "Scene") -> None:
     scene.note(f"output {how}")
 
     def begin() -> None:
+        if rig.wire.how == "away":  # is plugged in again, and ill otherwise
+            rig.loop.on_output_opened()
         rig.wire.how = how
         rig.loop.on_output_closed() if how == "away" else rig.wire.tick(rig.now())
         scene.judge.look()
