@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway import plain_file
 from gateway.plain_file import (
     check_plain,
     exists,
@@ -49,6 +50,15 @@ def test_what_the_kernel_shows_as_a_file_is_none() -> None:
     assert other_kind(path) == "a part of /proc" and other_kind(__file__) == ""
     with pytest.raises(FileNotFoundError, match="is a part of /proc, and no rig file"):
         locate("rig", str(path))
+
+
+def test_where_nothing_is_mounted_at_proc_a_file_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a bare chroot /proc is a folder on the disk of all files: each of them was refused, and no gateway began."""
+    monkeypatch.setattr(plain_file, "_A_PROCESS", str(tmp_path / "self"))
+    monkeypatch.setattr(plain_file, "_device_of_proc", plain_file._device_of_proc.__wrapped__)
+    path = tmp_path / "file"
+    path.write_bytes(b"1")
+    assert read_plain(path) == b"1" and other_kind(path) == ""
 
 
 @pytest.mark.parametrize("kind", MAKERS)
