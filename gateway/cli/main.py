@@ -38,6 +38,11 @@ ALIASES: Final = {"install-service": ("service", "install")}
 """Other names of subcommands, on which programs rely; the help does not list them."""
 _WHOLE: Final = 1000
 """More characters than the first sentence of any verb: a list of verbs folds it, and cuts nothing."""
+_MISSING_TEXTS: Final = (
+    "What it does is missing here, for Python was told to drop such texts (PYTHONOPTIMIZE=2, -OO): with 1 it stands here."
+    if sys.flags.optimize > 1
+    else None
+)
 HELP: Final = """Modbus gateway that holds a constant contact force, and says why the force is off.
 
 Begin with: force-gateway run demo --sim"""
@@ -83,8 +88,10 @@ class VerbGroup(SubcommandGroup):
             return None
         module = import_verb(cmd_name)
         command: click.Command = module.command
-        command.epilog = format_examples(getattr(module, "EXAMPLES", ()))
+        ends = (_MISSING_TEXTS, format_examples(getattr(module, "EXAMPLES", ())))
+        command.epilog = "\n\n".join(filter(None, ends)) or None
         for one in command.commands.values() if isinstance(command, click.Group) else ():
+            one.epilog = _MISSING_TEXTS
             one.short_help = one.get_short_help_str(_WHOLE)  # click itself cuts it at the width of the terminal
         return command
 
@@ -127,7 +134,7 @@ def _tell_argument(verb: click.Command | None, option_name: str, ctx: click.Cont
     return told.pop() if len(told) == 1 else ""
 
 
-@click.group(cls=VerbGroup, help=HELP, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=VerbGroup, help=HELP, epilog=_MISSING_TEXTS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(VERSION, prog_name="force-gateway", message="%(prog)s %(version)s")
 @click.option("--debug", is_flag=True, help="Show the traceback of a defect.")
 def command(debug: bool) -> None:

@@ -4,6 +4,7 @@ libyaml and PyYAML's own parser word the same fault differently, and neither num
 there is to tell them by. That is done here, in one table, and nowhere else; what the table does not know is told as it came.
 """
 
+import re
 from typing import Final, NamedTuple
 
 import yaml
@@ -58,6 +59,8 @@ _MEANINGS: Final = tuple(
     )
 )
 _UNKNOWN: Final = _Meaning("", "")
+_NO_BREAK_SPACE: Final = re.compile(r"^[ \t-]*(\u00a0)|^[^#'\"\n]*:(\u00a0)", re.MULTILINE)
+"""Where YAML wants a space. It looks like one, and is none: web pages and word processors put it there."""
 _BEHIND_A_BRACE: Final = "nothing but a comma stands behind `}`: quote the whole of a text that has braces in it"
 
 
@@ -70,6 +73,11 @@ def syntax_sentence(error: yaml.YAMLError, text: str) -> tuple[int, int, str]:
     indent = lines[line - 1][: max(column, 1)] if line <= len(lines) else ""
     if "\t" in indent and not indent.strip(" \t-"):
         return line, indent.index("\t") + 1, "a tab: YAML is indented with spaces"
+    lines_before = "\n".join(lines[:line])
+    if found := _NO_BREAK_SPACE.search(lines_before):
+        before = lines_before[: found.end() - 1]
+        column = len(before.rpartition("\n")[2]) + 1
+        return before.count("\n") + 1, column, "a no-break space (U+00A0), as web pages have it: type a plain space"
     if isinstance(error, TooDeepError):
         return line, column, _TOO_DEEP
     mark = getattr(error, "problem_mark", None)

@@ -311,7 +311,7 @@ class Guardian:
                 }
             )
         except OSError as error:
-            text = f"control process not started: {error.strerror or error}"
+            text = f"control process not started: {words.tell_no_process(error)}"
             return self._restart(Ending(EndCause.NOT_STARTED, text), "no process", None)
         return None
 

@@ -2,6 +2,7 @@
 
 import _thread
 import contextlib
+import errno
 import json
 import os
 import select
@@ -15,6 +16,12 @@ from gateway.processes.exit_cause import EndCause, Ending
 from gateway.service.supervisor.restart_policy import WINDOW_S
 
 _PATIENCE_S: Final = 0.1
+_LIMITS: Final = {
+    errno.EAGAIN: "raise how many processes and threads a user may have (ulimit -u, TasksMax= of a unit)",
+    errno.EMFILE: "raise how many files a process may have open (ulimit -n, LimitNOFILE= of a unit)",
+    errno.ENFILE: "raise how many files the machine may have open (sysctl fs.file-max)",
+    errno.ENOMEM: "the machine has no memory for it, or a limit is too low (ulimit -v, MemoryMax= of a unit)",
+}
 
 
 def print_error(sentence: str) -> None:
@@ -31,9 +38,14 @@ def print_ready(what: str | dict[str, Any]) -> None:
     the thread's beginning waited for, as threading.Thread does: one that has no memory to begin with never tells of it."""
     text = (what if isinstance(what, str) else json.dumps(what)) + "\n"
     is_written = threading.Event()
-    with contextlib.suppress(RuntimeError):  # no thread is to be had: nor is READY then
+    try:
         _thread.start_new_thread(_write_out, (_encode_for_stdout(text), is_written))
-        is_written.wait(_PATIENCE_S)
+    except RuntimeError:  # no thread is to be had (ulimit -u): as an error, for who reads now
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            if select.select([], [sys.stdout], [], _PATIENCE_S)[1]:
+                _write_out(_encode_for_stdout(text), is_written)
+        return
+    is_written.wait(_PATIENCE_S)
 
 
 def _encode_for_stdout(text: str) -> bytes:
@@ -54,6 +66,12 @@ def _write_out(data: bytes, is_written: threading.Event) -> None:
 def ready_sentence(rig: str, where: str, pids: Mapping[str, int]) -> str:
     """Return what the log says of a start. where: what it listens on; pids: process ids by name."""
     return f"ready: rig {rig}, {where}; processes: {', '.join(f'{name} {pid}' for name, pid in pids.items())}"
+
+
+def tell_no_process(error: OSError) -> str:
+    """Return why no process could be started: the system's words, and the limit that they mean but do not name."""
+    words, limit = error.strerror or str(error), _LIMITS.get(error.errno or 0, "")
+    return f"{words}: {limit}" if limit else words
 
 
 def restart_sentence(ending: Ending, how: str, acknowledged: bool | None) -> str:

@@ -11,6 +11,7 @@ from math import inf
 from typing import Final
 
 from gateway.service.supervisor.child_process import LOST, Child, describe_exit
+from gateway.service.supervisor.guardian_sentences import tell_no_process
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
 _LONG_LIFE_S: Final = 900.0  # a child that lived this long begins to count anew
@@ -70,7 +71,7 @@ class OptionalChildSupervisor:
         try:
             self._child = self._spawn()
         except OSError as error:
-            self._on_death_of_child(f"did not start ({error.strerror or error})", now_s)
+            self._on_death_of_child(f"did not start ({tell_no_process(error)})", now_s)
 
     def _on_death_of_child(self, how: str, now_s: float) -> None:
         if now_s - self._began_s >= _LONG_LIFE_S:

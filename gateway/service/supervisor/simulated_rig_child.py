@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from gateway.processes import message_link
 from gateway.service.supervisor.child_process import Child, describe_exit
+from gateway.service.supervisor.guardian_sentences import tell_no_process
 
 PAUSES_S: Final = (0.1, 1.0, 5.0)
 """Pauses before it is started again, short because control waits for it; one more death, and it stays off."""
@@ -85,7 +86,7 @@ class RigSupervisor:
         try:
             self._child = self._spawn(self._has_worked)
         except OSError as error:
-            self._on_death_of_child(error.strerror or str(error), now_s)
+            self._on_death_of_child(tell_no_process(error), now_s)
 
     def _overdue(self, now_s: float) -> None:
         if self._child is None:

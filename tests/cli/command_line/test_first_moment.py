@@ -29,6 +29,15 @@ def test_ctrl_c_while_the_first_modules_are_read_shows_no_traceback(monkeypatch:
     assert ended.value.code == "Aborted!"
 
 
+@pytest.mark.parametrize("words", [["--help"], ["read", "--help"], ["calibration", "use", "--help"]])
+def test_a_help_without_its_texts_says_who_has_dropped_them(words: list[str]) -> None:
+    """Takes a second: Python itself drops docstrings while it reads a module. Nothing was said."""
+    asked = subprocess.run(
+        [sys.executable, "-OO", "-m", "gateway", *words], stdout=subprocess.PIPE, text=True, check=True
+    )
+    assert asked.stdout.count("PYTHONOPTIMIZE=2") == 1
+
+
 @pytest.mark.parametrize(
     ("raised", "code"),
     [

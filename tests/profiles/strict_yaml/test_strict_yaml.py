@@ -67,6 +67,7 @@ def test_a_word_means_what_yaml_1_2_says(parse: Parse, written: str, meant: obje
 
 
 BLOCK = "`>` and `|` begin text on the lines below them: quote the text that begins so"
+NO_BREAK_SPACE = "a no-break space (U+00A0), as web pages have it: type a plain space"
 BEHIND_A_BRACE = "nothing but a comma stands behind `}`: quote the whole of a text that has braces in it"
 
 
@@ -103,6 +104,9 @@ BEHIND_A_BRACE = "nothing but a comma stands behind `}`: quote the whole of a te
         (b"a: {b: *{c:d}}\n", "rig.yaml:1:8: `*` and `&` name a value of YAML: quote the text that begins so"),
         (b"a: &\n", "rig.yaml:1:4: `*` and `&` name a value of YAML: quote the text that begins so"),
         (b"a: @x\n", "rig.yaml:1:4: a value cannot begin with this character: quote the text"),
+        ("a: @x \u00a0y\n".encode(), "rig.yaml:1:4: a value cannot begin with this character: quote the text"),
+        ("a:\n\u00a0 b: 1\n  c: 2\n".encode(), f"rig.yaml:2:1: {NO_BREAK_SPACE}"),
+        ("a: 1\nb:\u00a02\nc: 3\n".encode(), f"rig.yaml:2:3: {NO_BREAK_SPACE}"),
         *((f"a: {begun}V{{v:d}}\n".encode(), f"rig.yaml:1:4: {BLOCK}") for begun in (">", "|", ">+0", "|-")),
         (b"a: !V{v:d}\n", "rig.yaml:1:4: tags (`!...`) are not used here; quote the text"),
         (b"a: !!python/object:os.system x\n",

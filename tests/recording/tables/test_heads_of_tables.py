@@ -63,3 +63,16 @@ def test_of_many_notes_three_are_told_and_how_many_more() -> None:
     notes = [f"line {k}" for k in range(5)]
     told = [csv_table.shorten_notes(notes[:count], "such lines")[-1] for count in (3, 4, 5)]
     assert told == ["line 2", "and 1 more such lines", "and 2 more such lines"]
+
+
+@pytest.mark.parametrize("word", ["#N/A", "#NV", "1.#QNAN", "-1.#IND", "-nan(ind)"])
+@pytest.mark.parametrize("is_fast", [True, False])
+def test_what_a_program_writes_for_no_number_is_none(
+    word: str, is_fast: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Excel says it in its own language, Windows in its library's."""
+    if not is_fast:
+        monkeypatch.setattr(csv_table, "_read_fast", lambda *_: None)
+    cells = [f"{k / 100},1.0,{word if k == 7 else 5 + k}" for k in range(80)]
+    force_n = read_table(table(tmp_path, HEAD, *cells)).columns["force_n"]
+    assert [k for k, value in enumerate(force_n) if value != value] == [7] and force_n[8] == 13.0

@@ -1,6 +1,7 @@
 """What the guardian says goes out as far as somebody reads it, and nothing of it keeps the guardian from its work."""
 
 import contextlib
+import errno
 import io
 import os
 import select
@@ -73,6 +74,35 @@ def test_a_thread_that_never_begins_is_not_waited_for():
     )
     done = subprocess.run([sys.executable, "-c", code], stdout=PIPE, timeout=5.0, check=True)
     assert done.stdout == b"READY\n"
+
+
+@pytest.mark.parametrize("is_read", [True, False])
+def test_without_a_thread_ready_is_said_to_who_reads(monkeypatch, is_read):
+    """`ulimit -u 12`: the gateway served, and nobody was told."""
+
+    def refuse(*_):
+        raise RuntimeError("can't start new thread")
+
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with contextlib.suppress(BlockingIOError):
+        while not is_read:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    monkeypatch.setattr("_thread.start_new_thread", refuse)
+    with os.fdopen(writer, "w", encoding="utf-8") as stdout:
+        monkeypatch.setattr("sys.stdout", stdout)
+        words.print_ready("READY")
+    with os.fdopen(reader, "rb") as said:
+        assert said.read().strip(b"\0") == (b"READY\n" if is_read else b"")
+
+
+@pytest.mark.parametrize(("number", "limit"), [(errno.EAGAIN, "ulimit -u"), (errno.EMFILE, "ulimit -n")])
+def test_a_process_that_is_refused_is_told_with_the_limit_that_refuses_it(number, limit):
+    """ "Resource temporarily unavailable" names none."""
+    told = words.tell_no_process(OSError(number, os.strerror(number)))
+    assert told.startswith(f"{os.strerror(number)}: ") and limit in told
+    assert words.tell_no_process(OSError(errno.EPERM, "no")) == "no"
 
 
 def test_an_error_is_said_only_to_who_reads(monkeypatch):

@@ -193,6 +193,7 @@ def test_what_never_starts_ends_with_the_count_of_causes(scene, port):
     one = scene(no_process)
     assert one.run() == 1
     assert "A402 five restarts in 60 s (6 not-started)" in one.said[-1]
+    assert "Resource temporarily unavailable: raise how many processes" in one.said[0]
 
 
 @pytest.mark.parametrize(
