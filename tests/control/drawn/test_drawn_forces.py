@@ -8,10 +8,10 @@ from tests.control.drawn.scene import Scene
 from tests.control.drawn.wide_scene import WideScene
 
 SCENES = 10
-KEPT = 726, 1135, 3467, 8014, 8114, 10191, 201
+KEPT = 726, 1135, 3467, 8014, 8114, 10191, 201, 50
 """A swap beside a trim at its limit, one to the first measured response, single readings that hid a force that was off, noise
-at the very edge of the band, a trim at its limit beside a payload on its way, and a target that was held back for good. The
-last one alone needs its trim to be in band."""
+at the very edge of the band, a trim at its limit beside a payload on its way, and a target that was held back for good. 201
+alone needs its trim to be in band; in 50 alone a held force is raised, and its overshoot is bounded."""
 WIDE_SCENES = 2
 WIDE_KEPT = 2005, 3083, 8063, 8116, 30088, 116
 """A pull whose pressure came with the readback of a slow valve, a force that rose when it was lowered, a trim in newtons beyond

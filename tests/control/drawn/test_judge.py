@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf, nan
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,13 +16,14 @@ from gateway.control.settings import SafeDirection, ValveControl
 from gateway.devices.messages import ForceSample, Quality
 from gateway.devices.valve_profile import ValveDirection
 from gateway.registers.command import Command
-from gateway.registers.words import ControlBit, LimitedBy, State, StatusBit
+from gateway.registers.words import ControlBit, LimitedBy, Mode, State, StatusBit
 from tests.control.bench import Record, bsfm, settings
 from tests.control.drawn.judge import Judge
 from tests.control.drawn.machine import Machine
+from tests.control.drawn.scene import BUMP_V, Scene
 from tests.control.drawn.wide_machine import WideMachine
 from tests.control.drawn.wide_rig import WideRig
-from tests.control.drawn.wide_scene import WideJudge
+from tests.control.drawn.wide_scene import WideJudge, WideScene
 
 DT_S, RECORDS = 0.05, 400
 FORCE_N = 20.0
@@ -213,3 +215,43 @@ def test_each_law_of_valves_and_contacts_can_be_broken(law: tuple[str, Shown]) -
 @pytest.mark.parametrize("shown", [always(), always(**OFF), swinging(0.2)])
 def test_a_force_at_rest_breaks_no_law(shown: Shown) -> None:
     assert (played(Bounded, shown), played(WideJudge, shown)) == ("", "")
+
+
+class Risen(Judge):
+    """Whose master has gone from 10 N that were held to 20 N."""
+
+    def __init__(self, rig: Any) -> None:
+        super().__init__(rig)
+        self.calm_since_s = -10.0
+        held = SimpleNamespace(status=ON | StatusBit.IN_BAND, trim_v=0.0)
+        shown = SimpleNamespace(
+            now_s=0.0, whole_s=0.2, command=Command(ControlBit.ENABLE, 10.0), last=held,
+            machine=SimpleNamespace(force_n=10.0, touches=True),
+        )  # fmt: skip
+        scene: Any = SimpleNamespace(
+            rig=shown, judge=self, draw=Random(1), _force_n=lambda: FORCE_N,
+            _write=lambda *_, **__: self.changed() is None, _run=lambda _: None, _lead_share=lambda: 0.0,
+        )  # fmt: skip
+        Scene._go(scene)
+
+
+def test_a_force_that_overshoots_is_seen_and_one_that_comes_is_not() -> None:
+    """Few scenes of a push, or none, come to a held force that is raised, and none that is too high behind it."""
+    assert "at most: an overshoot" in played(Risen, later(true_n=26.5))
+    assert "at most" not in played(Risen, later(true_n=25.0))  # where friction lets it stand: 24 N
+
+
+@pytest.mark.parametrize(("leaps_v", "is_seen"), [(0.9 * BUMP_V, False), (1.1 * BUMP_V, True), (-1.1 * BUMP_V, True)])
+def test_volts_that_leap_by_newtons_are_seen(leaps_v: float, is_seen: bool) -> None:
+    judge = WideJudge(rig := FixedRig(1))
+    last = SimpleNamespace(voltage_v=0.0, status=ON, state=State.HOLDING)
+    judge.calm_since_s = -1000.0
+
+    def write(_: str, mode: Mode, **setpoint: float) -> bool:
+        last.voltage_v = setpoint["voltage_setpoint_v"] if mode is Mode.VOLTAGE else last.voltage_v + leaps_v
+        return True
+
+    shown = SimpleNamespace(settings=rig.settings, whole_s=0.1, now_s=1.0, last=last)
+    scene: Any = SimpleNamespace(rig=shown, judge=judge, draw=Random(1), _write=write, _run=lambda _: None)
+    WideScene._volts(scene)
+    assert ("by newtons" in judge.broken) is is_seen

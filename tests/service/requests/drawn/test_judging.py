@@ -8,9 +8,12 @@ from typing import Any
 import pytest
 
 from gateway.modbus import Peer
+from gateway.registers.words import State
 from tests.service.requests.drawn.judging import Executed, Judge
 from tests.service.requests.drawn.looks import Look
+from tests.service.requests.drawn.outsiders.browsers import Browsers
 from tests.service.requests.drawn.reference import OK, Verdict
+from tests.service.requests.drawn.scene import Scene
 
 HOST, OTHER = "10.0.0.5", "10.0.0.9"
 PEER = Peer(HOST, 4000)
@@ -113,3 +116,33 @@ def test_what_is_right_breaks_no_law() -> None:
     )
     told.shown("_judge_places", STAGED, (look(), look(words={PLACE: 0x1234})), "").shown("_was", ASKED).shown("end")
     assert told.broken == audited(what="stop").broken == []
+
+
+@pytest.mark.parametrize(("statuses", "is_seen"), [([200], False), ([], True), ([503], True), ([200, 200], True)])
+def test_a_stop_by_http_is_answered_once_and_well(statuses: list[int], is_seen: bool) -> None:
+    browser = SimpleNamespace(asked=0, statuses=[])
+    shown: Any = SimpleNamespace(
+        broken=[], _there=[browser], _come=lambda: browser, _leave=lambda _: None, _turn=lambda: None,
+        _send=lambda one, data: one.statuses.extend(statuses if b"command/stop" in data else []),
+    )  # fmt: skip
+    Browsers.stop(shown)
+    assert [sentence.startswith("a Stop by HTTP is answered") for sentence in shown.broken] == [True] * is_seen
+
+
+@pytest.mark.parametrize(
+    ("state", "word", "volts", "is_seen"),
+    [
+        (State.OFF, 0, 0.0, False),
+        (State.CALIBRATING, 0, 1.0, False),  # on its way to 0
+        (State.OFF, 1, 0.0, True),
+        (State.OFF, 0, 0.5, True),
+        (State.RAMPING, 0, 0.0, True),
+        (State.HOLDING, 0, 0.0, True),
+    ],
+)
+def test_a_stop_that_does_not_stop_is_seen(state: State, word: int, volts: float, is_seen: bool) -> None:
+    words = {"state": int(state), "control_word": word}
+    loop = SimpleNamespace(decision=SimpleNamespace(voltage_v=volts))
+    shown: Any = SimpleNamespace(world=SimpleNamespace(wired=SimpleNamespace(word=words.get, loop=loop)), judge=Told())
+    Scene._judge_stopped(shown, "http")
+    assert [sentence.startswith("http has stopped") for sentence in shown.judge.broken] == [True] * is_seen

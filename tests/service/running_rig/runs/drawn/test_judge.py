@@ -13,6 +13,7 @@ from gateway.control import LeaseAction
 from gateway.control.settings import SelfTestSettings
 from gateway.registers.words import CalibrationPhase, SelfTestResult, SelfTestVerdict, State, StatusBit
 from tests.control.bench import settings
+from tests.service.running_rig.runs.drawn import acts, events
 from tests.service.running_rig.runs.drawn.judge import Judge
 from tests.service.running_rig.runs.drawn.run_laws import ITEMS, Asked
 from tests.service.running_rig.runs.drawn.scene import Scene
@@ -269,3 +270,27 @@ def test_what_is_over_disturbs_no_longer_and_what_lasts_does(tmp_path: Path) -> 
 def test_what_is_well_breaks_no_law(play: Callable[[Shown], object]) -> None:
     play(shown := Shown())
     assert shown.judge.broken == []
+
+
+@pytest.mark.parametrize("state", [HOLDS, OFF])
+def test_a_stopped_process_that_still_presses_is_seen(state: State) -> None:
+    shown = Shown().begun().tick(1, state, 0.0)
+    shown.rig.controller = SimpleNamespace(stop=lambda: None, has_stopped=False)
+    shown.rig.run = lambda _: None
+    scene: Any = SimpleNamespace(rig=shown.rig, laws=shown.laws, judge=shown.judge, note=len, renew=lambda **_: None)
+    acts.end_process(scene)
+    assert any("still presses after 4.5 s" in broken for broken in shown.judge.broken) is (state is HOLDS)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "begins", "is_seen"), [(3.0, True, True), (3.0, False, False), (0.05, True, False)]
+)
+def test_a_run_that_begins_by_what_has_waited_is_seen(
+    monkeypatch: pytest.MonkeyPatch, seconds: float, begins: bool, is_seen: bool
+) -> None:
+    shown = Shown()
+    shown.rig.stand_still, shown.rig.run = lambda *_, **__: None, lambda _: None
+    draw = SimpleNamespace(choice=lambda _: seconds, random=lambda: 0.1)
+    monkeypatch.setattr(acts, "begin", lambda _: shown.begun("calibration") if begins else None)
+    events.machine(SimpleNamespace(rig=shown.rig, laws=shown.laws, judge=shown.judge, draw=draw, note=len))  # type: ignore[arg-type]
+    assert [broken.endswith("by what has waited") for broken in shown.judge.broken] == [True] * is_seen
