@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, Literal
 
 DIRECTORY: Final = "a directory"
-_A_PROCESS: Final = "/proc/self"  # the folder alone stands in a bare chroot, too, on the disk of all its files
+_PROC: Final = "/proc"
 _REASONS: Final = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "this user may store no more there",
@@ -170,8 +170,8 @@ def _other_kind(status: os.stat_result) -> str:
 
 @cache
 def _device_of_proc() -> int:
-    try:
-        return os.stat(_A_PROCESS).st_dev  # noqa: PTH116
+    try:  # of what is in it: the folder alone stands in a bare chroot, too, on the disk of all files
+        return os.stat(f"{_PROC}/self").st_dev  # noqa: PTH116
     except OSError:
         return -1
 

@@ -54,7 +54,7 @@ def test_what_the_kernel_shows_as_a_file_is_none() -> None:
 
 def test_where_nothing_is_mounted_at_proc_a_file_is_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a bare chroot /proc is a folder on the disk of all files: each of them was refused, and no gateway began."""
-    monkeypatch.setattr(plain_file, "_A_PROCESS", str(tmp_path / "self"))
+    monkeypatch.setattr(plain_file, "_PROC", str(tmp_path))
     monkeypatch.setattr(plain_file, "_device_of_proc", plain_file._device_of_proc.__wrapped__)
     path = tmp_path / "file"
     path.write_bytes(b"1")

@@ -19,23 +19,7 @@ from gateway.recording.foreign.time_stamps import is_ambiguous_date, parse_stamp
 from gateway.recording.foreign.unit_names import is_unit
 
 MISSING: Final = frozenset(
-    (
-        "",
-        "nan",
-        "na",
-        "n/a",
-        "#n/a",
-        "#nv",
-        "null",
-        "none",
-        "-",
-        "--",
-        "nan(ind)",
-        "-nan(ind)",
-        "1.#qnan",
-        "1.#ind",
-        "-1.#ind",
-    )
+    ("", *"nan na n/a #n/a #nv null none - -- nan(ind) -nan(ind) 1.#qnan 1.#ind -1.#ind".split())
 )
 """What stands, in lower case, where no number was taken: #NV is a German Excel's #N/A, the last ones Windows' own NaN."""
 LONGEST_LINE: Final = 1 << 20
