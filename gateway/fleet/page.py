@@ -144,7 +144,8 @@ def _caveats(cells: Sequence[CellDrift]) -> list[str]:
     law = f"less than {100 * ALPHA:g} % of fleets (Kendall's test and Student's t, Holm over all cells)"
     said = [f"Drift: a slope as steep comes by chance in {law}, and the change is {LEAST_N:g} N or more."]
     if unjudged:
-        said.append(f"{len(unjudged)} cells have fewer than {LEAST_DAYS} days or no dates: their trend is not judged.")
+        have, their = ("cell has", "its") if len(unjudged) == 1 else ("cells have", "their")
+        said.append(f"{len(unjudged)} {have} fewer than {LEAST_DAYS} days or no dates: {their} trend is not judged.")
     if len(cells) > _MOST_DRAWN:
         said.append(f"{_MOST_DRAWN} of {len(cells)} cells are drawn; cells.parquet has all.")
     return said

@@ -56,6 +56,8 @@ def test_processes_give_the_rows_of_one_and_a_death_costs_none(tmp_path: Path) -
     assert [by_file[Path(task.path).read_text()] for task in others] == rows_of(run_serially, count_bytes, others)
     assert by_file["unreadable"]["error_code"] == "E403"
     assert by_file["once upon a time"]["value_n"] == 16.0
+    beside_no_death = folder_of(tmp_path / "again", "unreadable")
+    assert [row["error_code"] for row in rows_of(processes(1), count_bytes, beside_no_death)] == ["E403"]
 
 
 def on_a_cluster(*words: str) -> str:
