@@ -44,6 +44,13 @@ def test_a_scraper_that_asks_for_a_version_that_is_none_reads_the_usual_text(tmp
     assert answer.status == 200 and answer.headers["content-type"].startswith("text/plain")
 
 
+def test_a_scraper_that_asks_for_open_metrics_reads_them_to_their_mark_of_an_end(tmp_path: Path) -> None:
+    asked = {"accept": "application/openmetrics-text;version=1.0.0"}
+    answer = asyncio.run(call(make_metrics_app(tmp_path), "GET", "/metrics", asked))
+    assert answer.headers["content-type"].startswith("application/openmetrics-text; version=1.0.0")
+    assert answer.body.decode().endswith("\nforce_gateway_up 0.0\n# EOF\n")
+
+
 def test_both_ways_tell_the_same_and_an_absent_control_leaves_nothing_but_down(tmp_path: Path) -> None:
     health = HEALTH | {"residual": {"cause": 0, "name": "none", "looks": 4}}
 

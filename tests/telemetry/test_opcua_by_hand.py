@@ -8,6 +8,7 @@ from unittest.mock import AsyncMock
 import pytest
 
 from gateway.fieldbus.settings import ServerSettings
+from gateway.live.control_link import ControlLink
 from gateway.telemetry import opcua_process
 from gateway.telemetry.opcua_connections import _judge, bound_connections, bound_publishing
 from gateway.telemetry.opcua_process import GatewayNodes
@@ -119,7 +120,7 @@ def test_a_port_that_is_taken_is_told_or_that_it_serves_and_all_is_bounded_and_f
     monkeypatch.setattr(opcua_process, "bound_connections", lambda wire, log: did.append(wire.__name__))
     monkeypatch.setattr(opcua_process, "bound_publishing", lambda service, least_s: did.append((service, least_s)))
     monkeypatch.setattr(opcua_process, "GatewayNodes", Nodes)
-    monkeypatch.setattr(opcua_process, "_show_forever", AsyncMock())
+    monkeypatch.setattr(opcua_process, "_show_forever", show_forever := AsyncMock())
     options = {"settings": {"name": "demo", "listen": "127.0.0.1:4840"}, "state": "/nowhere"}
     log: Any = lambda cause, sentence: did.append((cause, sentence))  # noqa: E731
     asyncio.run(opcua_process.serve(options, log))
@@ -128,6 +129,8 @@ def test_a_port_that_is_taken_is_told_or_that_it_serves_and_all_is_bounded_and_f
         ("admin", False), "demo", None, "serves",
         ("start", "E127 opcua.listen: Address already in use" if is_taken else "OPC UA is served: opc.tcp://127.0.0.1:4840/"),
     ]  # fmt: skip
+    given = [[type(each) for each in called.args] for called in show_forever.await_args_list]
+    assert given == ([] if is_taken else [[Nodes, ControlLink]])
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,10 @@ def test_a_birth_names_all_with_types_and_its_death_has_its_bd_seq() -> None:
         node.lose()
 
 
+def test_no_old_word_to_an_edge_node_presses_so_that_its_broker_is_not_asked_for_signs_of_life() -> None:
+    assert EdgeNode("plant", NODE_NAME, itertools.count().__next__).may_press is False
+
+
 def test_no_force_is_told_under_the_name_of_another() -> None:
     state, told = holding(), values_of(holding())
     for name in ("measured", "requested", "accepted", "applied"):
