@@ -46,26 +46,23 @@ def list_command(*, state: StateChoice, as_json: bool) -> None:
 
     store = open_store(state.directory, state.rig)
     selected, entries = store.find_selected(), store.list()
+    notes = [*selected.notes, *_tell_hidden(store.built_in, selected, state.rig)]
     if as_json:
         facts = {
             "active": _number(selected),
-            "notes": selected.notes,
+            "notes": notes,
             "built_in": _built_in_facts(store.built_in, selected),
             "calibrations": [_facts(entry, selected) for entry in entries],
         }
         click.echo(json.dumps(facts, indent=2))
         return
-    for note in selected.notes:
+    for note in notes:
         click.echo(note, err=True)
     lines = []
     if store.built_in:
         mark = "*" if selected.selection.number is None else " "
         description = describe_calibration(store.built_in, _slots(selected, OWN), is_own=True)
         lines += fold_entry(store.built_in.number, description, mark)
-    else:
-        is_used = ", in use," if selected.selection.number is None else ""
-        why = tell_rig_fault(state.rig) or "give the rig's file by --rig"
-        click.echo(f"the rig's own{is_used} is not shown: {why}", err=True)
     for entry in entries:
         is_rejected = entry.document is not None and bool(entry.document.rejected)
         mark = "*" if selected.selection.number == entry.number else "x" if is_rejected else " "
@@ -198,6 +195,15 @@ def _write(texts: dict[Path, str], *, force: bool) -> None:
 
 def _number(selected: "SelectedDocument[Calibration]") -> int | None:
     return selected.document.number if selected.document else None
+
+
+def _tell_hidden(own: "Calibration | None", selected: "SelectedDocument[Calibration]", rig: str) -> list[str]:
+    """Return why the rig's own calibration is not listed; nothing where it is."""
+    if own:
+        return []
+    is_used = ", in use," if selected.selection.number is None else ""
+    why = tell_rig_fault(rig) or "give the rig's file by --rig"
+    return [f"the rig's own{is_used} is not shown: {why}"]
 
 
 def _built_in_facts(own: "Calibration | None", selected: "SelectedDocument[Calibration]") -> dict[str, Any] | None:

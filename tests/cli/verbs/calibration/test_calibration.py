@@ -232,6 +232,8 @@ def test_beside_a_broken_rig_file_all_that_is_stored_is_at_hand_and_what_to_mend
     listed = call("calibration", "list", *given)
     assert [entry[0][:4] for entry in entries(listed.stdout)] == ["   2", "*  3"]
     assert place in listed.stderr and f"force-gateway check {rig}" in listed.stderr and "--rig" not in listed.stderr
+    facts = json.loads(call("calibration", "list", *given, "--json").stdout)
+    assert facts["built_in"] is None and place in facts["notes"][-1]
     assert call("calibration", "show", *given).stdout.startswith("number: 3")
     assert call("calibration", "export", 2, *given).stdout.startswith("number: 2")
     used = call("calibration", "use", 2, *given)
