@@ -130,8 +130,9 @@ class TableHeaders:
             k for k in free if set(self.headers[k].words.split()) & {word for word in _CALLED[name] if len(word) > 2}
         ]
         stamped = [k for k in free if k in self.stamps and name == "time_s"]
+        both = [k for k in called if k in stamped]
         by_unit = [k for k in free if self.headers[k].unit_for(name)]
-        return next(iter([*called, *stamped, *words, *by_unit]), None)
+        return next(iter([*both, *stamped, *called, *words, *by_unit]), None)
 
     def _entry(self, name: str, place: int) -> tuple[str, str]:
         """Return `force_n=3:kgf`, and what has to be said about it."""

@@ -33,6 +33,7 @@ _POINT_CELL: Final = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _THOUSANDS_CELL: Final = re.compile(r"[-+]?[1-9]\d{0,2}(?:,\d{3})+(?:\.\d*)?")
 _QUOTED: Final = re.compile(r'"[^"]*"')
 _NAMED_SEPARATOR: Final = re.compile(r'"?sep=(.)"?', re.IGNORECASE)
+_LABVIEW_END: Final = "***End_of_Header***"
 _UNPRINTABLE: Final = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 
@@ -87,7 +88,9 @@ class CsvDialect:
 
     def headers(self) -> TableHeaders:
         """Return what the headers say, with the units below them."""
-        return TableHeaders.of(self.names, self.units, [k for k in range(len(self.names)) if self.is_stamps(k)])
+        stamps = [k for k in range(len(self.names)) if self.is_stamps(k)]
+        going_on = [k for k in stamps if len(set(self._filled(k))) > 1]  # a date stands still beside the time of day
+        return TableHeaders.of(self.names, self.units, going_on or stamps)
 
     def _filled(self, index: int) -> list[str]:
         return [row[index] for row in self.sample if index < len(row) and row[index].strip().lower() not in MISSING]
@@ -153,7 +156,7 @@ def _make_dialect(path: Path, file: Path, facts: dict[str, str], lines: list[tup
     if _UNPRINTABLE.search(lines[0][1]):
         raise RecordingError(f"{path} is neither a recording nor a CSV: line {lines[0][0]} is no text")
     separator = named[1] if named else _separator([line for _, line in lines])
-    lines, notes = _without_title(lines, separator)
+    lines, notes = _behind_labview(lines) or _without_title(lines, separator)
     (at, first), rest = lines[0], [line for _, line in lines[1:]]
     decimal, is_sure = _decimal(separator, rest or [first])
     names = tuple(cell.strip() for cell in split_cells(first, separator))
@@ -184,6 +187,14 @@ def _decimal(separator: str, rows: Sequence[str]) -> tuple[str, bool]:
     if commas and not (has_points and all(map(_THOUSANDS_CELL.fullmatch, commas))):
         return ",", True
     return ".", has_points
+
+
+def _behind_labview(lines: list[tuple[int, str]]) -> tuple[list[tuple[int, str]], list[str]] | None:
+    """Leave out what LabVIEW's measurement files tell of the machine and of each channel, in lines as wide as rows; None for
+    any other file."""
+    ends = [k for k, (_, line) in enumerate(lines[:_MOST_TITLE_LINES]) if line.startswith(_LABVIEW_END)]
+    behind = lines[ends[-1] + 1 :] if ends else []
+    return (behind, [f"LabVIEW's lines before the header (line {behind[0][0]}) were left out"]) if behind else None
 
 
 def _without_title(lines: list[tuple[int, str]], separator: str) -> tuple[list[tuple[int, str]], list[str]]:

@@ -6,6 +6,8 @@ import pytest
 
 from gateway.recording import RecordingError, read_table
 from gateway.recording.tables import csv_table
+from gateway.recording.tables.column_mapping import ColumnMapping
+from gateway.recording.tables.csv_dialect import detect_dialect
 
 HEAD = "time_s,command_v,force_n"
 
@@ -25,6 +27,31 @@ def test_sixty_lines_of_a_report_may_stand_above_the_header(tmp_path: Path) -> N
     assert (found.rows, found.notes) == (200, ("60 lines before the header (line 61) were left out",))
     with pytest.raises(RecordingError):
         read_table(table(tmp_path, *["Report of a cell"] * 61, HEAD, *rows(200)))
+
+
+LABVIEW = (
+    "LabVIEW Measurement\t", "Separator\tTab", "Time_Pref\tRelative", "***End_of_Header***\t", "", "Channels\t2\t\t",
+    "Samples\t200\t200\t", "X_Dimension\tTime\tTime\t", "X0\t0.0\t0.0\t", "***End_of_Header***\t\t\t",
+)  # fmt: skip
+
+
+def test_of_a_labview_measurement_the_rows_are_read_and_not_what_it_tells_of_each_channel(tmp_path: Path) -> None:
+    """Its lines are as wide as the rows: `a column name stands twice in the header: 200`."""
+    lines = [f"{row}," for row in rows(200)]
+    text = [line.replace(",", "\t") for line in ("X_Value,command_v,force_n,Comment", *lines)]
+    found = read_table(table(tmp_path, *LABVIEW, *text), ColumnMapping.parse("time_s=X_Value:s"))
+    assert (found.rows, found.columns["force_n"][-1]) == (200, 199.0)
+    assert "LabVIEW's lines before the header (line 11) were left out" in found.notes
+    assert found.place(0).endswith(":12")
+
+
+def test_of_a_date_beside_a_time_of_day_the_one_that_goes_on_is_the_time(tmp_path: Path) -> None:
+    """The date was suggested for it."""
+    lines = [f"2026-11-30,10:00:{k:02d},{k % 5},{k}" for k in range(60)]
+    found = read_table(table(tmp_path, "Date,Time,command_v,force_n", *lines))
+    assert found.columns["time_s"].tolist() == [float(k) for k in range(60)]
+    other = detect_dialect(table(tmp_path, "Date,Time of day,command_v,force_n", *lines))
+    assert other.headers().suggest() == "Meant is probably --columns time_s=2"
 
 
 def test_what_a_comment_says_begins_behind_its_first_colon(tmp_path: Path) -> None:

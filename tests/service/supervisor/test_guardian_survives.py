@@ -35,6 +35,7 @@ def test_a_control_process_that_dies_at_the_nth_step_is_started_again(scene, por
     if not (steps == 0 and code is None):  # nobody has risked anything: the long way, which counts as no restart
         (line,) = [line for line in one.said if line.startswith("A401")]
         assert ("acknowledged" if had_line else "no line was open") in line
+        assert "SIGKILL" in line if code in (-9, None) else f"exit {code}" in line
     assert_comes_up(one)
     restarted = Ending.from_json(one.starter.arguments[1]["restarted"])
     assert (restarted is None) is (steps == 0 and code is None)

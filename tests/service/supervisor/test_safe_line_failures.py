@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -16,6 +17,7 @@ from gateway.devices import DeviceProfile, output_host
 from gateway.ports import Pty
 from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine, told_of_reply
+from gateway.service.supervisor import safe_line
 from gateway.service.supervisor.control_child import ControlChild
 from gateway.service.supervisor.safe_line import REPLY_S, SafeLine
 from tests.profile_files import load_device
@@ -32,6 +34,17 @@ def failing(call: Callable[..., object], numbers: list[int]) -> Callable[..., ob
         return call(descriptor, data)
 
     return fails_first
+
+
+def test_what_is_said_up_to_the_last_moment_and_is_no_acknowledgement_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However the time runs out: while it waits for more, or amid what has come."""
+    ticks = iter(range(100))
+    monkeypatch.setattr(safe_line, "time", SimpleNamespace(monotonic=lambda: 0.01 * next(ticks)))
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.sendall(b"7\r\n" * 1000)
+        assert SafeLine(ours.fileno(), FRAME, REPLY, END)._wait_for_acknowledgement(0.055) is False
+        assert ours.recv(1), "its time was over before there was nothing to read"
 
 
 @pytest.mark.parametrize("number", [errno.EAGAIN, errno.EIO])
