@@ -119,6 +119,7 @@ def unit_text(options: UnitOptions) -> str:
         "WorkingDirectory=%S/" + NAME,
         f"Nice={LOOP_NICE}",  # as the gateway asks for itself, where it may; its other processes step back
         f"LimitNICE={LOOP_NICE}",  # for control, which is forked from one that has stepped back
+        "OOMScoreAdjust=-500",  # another program goes first when memory runs out; what control can do without, before any
         "OOMPolicy=continue",  # of a child that control can do without: the guardian starts it again
         "",
         _HARDENING.rstrip(),

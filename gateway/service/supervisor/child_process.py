@@ -10,7 +10,11 @@ import os
 import select
 import signal
 import socket
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import inf
+from pathlib import Path
 from typing import Any, Final
 
 from gateway.processes import message_link as guardian_link
@@ -20,6 +24,8 @@ from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 _END_BOUND_S: Final = 1.0
 _REAP_BOUND_S: Final = 2.0  # a killed process is gone in milliseconds, unless a driver holds it
 _BLOCKED: Final = (signal.SIGHUP, signal.SIGINT)  # the guardian's to answer: some send them to every process
+_ONE_SHORTAGE_S: Final = 10.0
+_STARVED: Final = ", while the kernel killed for want of memory: see dmesg"
 LOST: Final = -1000
 """The exit code of a child that nobody could ask: it does not go, or somebody else has reaped it."""
 
@@ -81,14 +87,43 @@ class Child:
             self.died = -1
 
 
+class MemoryKills:
+    """Whether the kernel has just killed for want of memory, be it a container's or the machine's: who is killed so is told
+    nothing. count: how many it has killed."""
+
+    def __init__(self, count: Callable[[], int], clock: Callable[[], float] = time.monotonic) -> None:
+        self._count, self._clock = count, clock
+        self._known, self._last_s = count(), -inf
+
+    def have_just_happened(self) -> bool:
+        """Asked at each death: those of one shortage come one after the other."""
+        if (now := self._count()) != self._known:
+            self._known, self._last_s = now, self._clock()
+        return self._clock() - self._last_s <= _ONE_SHORTAGE_S
+
+
+def count_memory_kills() -> int:
+    """Return how many processes the kernel has killed for want of memory since it began, see proc_vmstat(5); 0 where it does
+    not say."""
+    with contextlib.suppress(OSError, ValueError):
+        for line in Path("/proc/vmstat").read_text().splitlines():
+            if line.startswith("oom_kill "):
+                return int(line.split()[1])
+    return 0
+
+
+memory_kills = MemoryKills(count_memory_kills)
+
+
 def describe_exit(code: int) -> str:
-    """Return an exit code in words: `exit 1`, `SIGKILL`."""
+    """Return an exit code in words: `exit 1`, `SIGKILL`, and of the last one whether memory may have been the reason."""
     if code == LOST:
         return "no exit code"
     if code >= 0:
         return f"exit {code}"
+    is_starved = -code == signal.SIGKILL and memory_kills.have_just_happened()
     try:
-        return signal.Signals(-code).name
+        return signal.Signals(-code).name + _STARVED * is_starved
     except ValueError:
         return f"signal {-code}"
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import inf
 from typing import Final
 
-from gateway.service.supervisor.child_process import LOST, Child, describe_exit
+from gateway.service.supervisor.child_process import Child, describe_exit
 from gateway.service.supervisor.guardian_sentences import tell_no_process
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
@@ -56,7 +56,7 @@ class OptionalChildSupervisor:
             code = self._child.wait()
             self._child.close()
             self._child = None
-            self._on_death_of_child(f"ended ({f'signal {-code}' if LOST < code < 0 else describe_exit(code)})", now_s)
+            self._on_death_of_child(f"ended ({describe_exit(code)})", now_s)
         elif now_s >= self._due_s:
             self._begin(now_s)
 

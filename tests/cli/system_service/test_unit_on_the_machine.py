@@ -104,6 +104,7 @@ def test_a_unit_that_is_gone_is_gone_for_systemd_too(tmp_path: Path, monkeypatch
 def test_a_helper_that_the_kernel_ends_for_want_of_memory_does_not_end_the_gateway() -> None:
     """systemd stops a unit of which it ends anybody unless it is told not to: the force went with the residual watch."""
     assert setting("OOMPolicy", "stop") == "continue"
+    assert int(setting("OOMScoreAdjust", "0")) < 0, "another program goes first"
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,15 @@ import pytest
 
 from gateway.processes.scheduling.scheduler_counters import SchedulerCounters
 from gateway.service.supervisor import child_process
-from gateway.service.supervisor.child_process import LOST, Child, describe_exit, reap_orphans, spawn_child
+from gateway.service.supervisor.child_process import (
+    LOST,
+    Child,
+    MemoryKills,
+    count_memory_kills,
+    describe_exit,
+    reap_orphans,
+    spawn_child,
+)
 from gateway.service.supervisor.event_wait import wait_readable
 from tests.processes.held_program import held_program
 from tests.service.supervisor.scripted_children import open_descriptors
@@ -231,6 +239,32 @@ def test_orphans_are_reaped_and_neither_the_living_nor_the_known_ones() -> None:
         signal.alarm(10)
         os._exit(0 if _reaps_one_of_three() else 1)
     assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+
+
+def test_who_is_killed_while_the_kernel_kills_for_want_of_memory_is_told_with_that_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`control process died; SIGKILL`, and nobody had killed it."""
+    killed, now_s = [3], [100.0]
+    monkeypatch.setattr(child_process, "memory_kills", MemoryKills(lambda: killed[0], lambda: now_s[0]))
+    assert describe_exit(-9) == "SIGKILL", "those of before are not ours"
+    killed[0] = 5
+    assert describe_exit(-15) == "SIGTERM"
+    assert describe_exit(-9).startswith("SIGKILL, while the kernel killed for want of memory")
+    now_s[0] += 9.0
+    assert "memory" in describe_exit(-9), "the second one of the same shortage"
+    now_s[0] += 2.0
+    assert describe_exit(-9) == "SIGKILL"
+
+
+def test_the_kernel_s_count_of_those_is_read_and_0_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "read_text", lambda _path: "nr_free_pages 7\noom_kill 12\noom_kill_other 3\n")
+    assert count_memory_kills() == 12
+    monkeypatch.setattr(Path, "read_text", lambda _path: "nr_free_pages 7\n")
+    assert count_memory_kills() == 0
+    monkeypatch.undo()
+    known = [line for line in Path("/proc/vmstat").read_text().splitlines() if line.startswith("oom_kill ")]
+    assert not known or count_memory_kills() >= int(known[0].split()[1])
 
 
 @pytest.mark.parametrize(
