@@ -39,7 +39,7 @@ from gateway.service.running_rig.handover import Handover, left_of
 from gateway.service.running_rig.recording.recorded_row import COLUMNS
 from gateway.service.running_rig.running_rig import RunningRig
 from gateway.service.running_rig.starting import StartError
-from gateway.service.supervisor.fork_server import tell_want
+from gateway.service.supervisor.fork_server import run_main
 
 _GUARDIAN_GONE: Final = (
     "A412 the guardian is gone (killed, or out of memory): the safe voltage goes out at once, and the gateway ends"
@@ -190,9 +190,4 @@ async def _wait_first(*events: asyncio.Event) -> None:
 
 
 if __name__ == "__main__":
-    try:
-        sys.exit(main(sys.argv[1:]))
-    except (MemoryError, OSError) as error:
-        if want := tell_want(error):
-            sys.exit(want)
-        raise
+    run_main(main)

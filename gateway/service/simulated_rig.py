@@ -12,7 +12,6 @@ import json
 import os
 import signal
 import socket
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -34,6 +33,7 @@ from gateway.profiles.kept_rig import kept_rig
 from gateway.service.simulation.kept_settings import KeptSettings
 from gateway.service.simulation.settings import SimulationSettings
 from gateway.service.simulation.world import SimulatedRig
+from gateway.service.supervisor.fork_server import run_main
 
 _KEPT_S: Final = 1.0  # of a stream that nobody reads, in a driver
 _LAST_WORDS_S: Final = 0.5  # longer than control takes to its last write and the answer
@@ -232,4 +232,4 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    run_main(main)

@@ -26,6 +26,7 @@ import socket
 import sys
 import time
 import traceback
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -130,6 +131,16 @@ def tell_want(error: BaseException) -> str:
         if is_want
         else ""
     )
+
+
+def run_main(main: Callable[[list[str]], int]) -> None:
+    """Run a process that was started the long way, and end it by what main returns, or by why it could not begin."""
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except (MemoryError, OSError) as error:
+        if want := tell_want(error):
+            sys.exit(want)
+        raise
 
 
 def _run_child(message: guardian_link.Message, parent: int) -> int:

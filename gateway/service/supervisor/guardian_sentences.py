@@ -17,7 +17,7 @@ from gateway.service.supervisor.restart_policy import WINDOW_S
 
 _PATIENCE_S: Final = 0.1
 _LIMITS: Final = {
-    errno.EAGAIN: "raise how many processes and threads a user may have (ulimit -u, TasksMax= of a unit)",
+    errno.EAGAIN: "raise how many processes and threads there may be (ulimit -u, TasksMax= of a unit, --pids-limit)",
     errno.EMFILE: "raise how many files a process may have open (ulimit -n, LimitNOFILE= of a unit)",
     errno.ENFILE: "raise how many files the machine may have open (sysctl fs.file-max)",
     errno.ENOMEM: "the machine has no memory for it, or a limit is too low (ulimit -v, MemoryMax= of a unit)",

@@ -7,7 +7,7 @@ import json
 import os
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -242,3 +242,22 @@ def test_a_child_for_which_the_machine_has_too_little_says_so_and_any_other_end_
     os.close(theirs)
     said = capfd.readouterr().err
     assert said.startswith("E106 it does not start (") is is_told and ("Traceback" in said) is not is_told
+
+
+def test_a_process_that_is_started_by_itself_says_so_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The simulated rig ended in a traceback where a container allowed nine tasks."""
+    monkeypatch.setattr("sys.argv", ["a module", "7", "{}"])
+
+    def fail(number: int) -> Callable[[list[str]], int]:
+        def main(arguments: list[str]) -> int:
+            assert arguments == ["7", "{}"]
+            raise OSError(number, "as told")
+
+        return main
+
+    with pytest.raises(SystemExit, match=r"^E106 it does not start \(as told\)"):
+        fork_server.run_main(fail(errno.EAGAIN))
+    with pytest.raises(OSError, match="as told"):
+        fork_server.run_main(fail(errno.EBADF))
+    with pytest.raises(SystemExit, match=r"^69$"):
+        fork_server.run_main(lambda _: 69)
