@@ -148,8 +148,8 @@ class FaultCode(IntEnum):
             "A319",
             "control loop stalled",
             "The loop came round later than the bound; commands that waited meanwhile were dropped.",
-            "It was stopped, or the whole machine was suspended, or an internal error; where the kernel does not count "
-            "waiting, an overloaded machine.",
+            "It was stopped, its container paused, or the whole machine suspended, or an internal error; where the kernel "
+            "does not count waiting, an overloaded machine.",
             "The line says which, if the kernel counts it; look for other load (top). One that goes to sleep: "
             "`systemctl mask sleep.target`.",
         ),

@@ -154,7 +154,8 @@ def _cause_of_lateness(late_s: float, waited_s: float, ran_s: float, *, is_count
         return f"{times_text}: {BUSY_CURE}"
     if is_cause(ran_s, late_s):
         return f"{times_text}: the gateway's own work takes too long here; a slower loop_hz, fewer clients, or a faster machine"
-    return f"{times_text}: this machine stood still or slept (a virtual one on a busy host, a CPU in deep sleep)"
+    hosts = "a virtual one on a busy host, a paused container, a CPU in deep sleep"
+    return f"{times_text}: this machine stood still or slept ({hosts})"
 
 
 def _late_rig_words(held: Held) -> str:
