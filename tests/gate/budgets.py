@@ -1,4 +1,5 @@
-"""What the push gate leaves to the long run: what is marked `long`, and of a `sampled` table two cases in three."""
+"""What the push gate leaves to the long run: what is marked `long`, of a `sampled` table two cases in three, and as much of
+what a search draws."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -15,6 +16,11 @@ def examples(count: int) -> int:
     """Return how many examples hypothesis draws: so many in a long run, one in three of them in the push gate."""
     is_push = hypothesis.settings.default is not None and hypothesis.settings.default.derandomize
     return -(-count // SAMPLED) if is_push else count
+
+
+def scenes(count: int, budget: int) -> int:
+    """Return how many scenes a drawn search plays: one in three of count in the push gate, budget times count in a long run."""
+    return count * budget if budget > 1 else -(-count // SAMPLED)
 
 
 def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:

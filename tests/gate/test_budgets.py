@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 from hypothesis._settings import local_settings
 
-from tests.gate.budgets import examples, leave_out_long
+from tests.gate.budgets import examples, leave_out_long, scenes
 
 
 class Item(SimpleNamespace):
@@ -79,3 +79,8 @@ def test_what_needs_the_bigger_budget_does_not_run_without_it(in_silence: bool, 
     leave_out_long(items, in_silence=in_silence)
     assert [item.name for item in items] == left
     assert (short.marks, long.marks) == ([], ["skip"])
+
+
+def test_a_drawn_search_plays_a_third_of_its_scenes_in_a_push_and_never_none() -> None:
+    assert [scenes(count, 1) for count in (1, 2, 7, 30)] == [1, 1, 3, 10]
+    assert scenes(7, 20) == 140

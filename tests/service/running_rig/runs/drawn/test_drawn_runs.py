@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.gate.budgets import scenes
 from tests.service.running_rig.runs.drawn.run_rig import Fits
 from tests.service.running_rig.runs.drawn.scene import Scene
 
@@ -24,5 +25,5 @@ def test_a_run_keeps_to_what_it_states_and_ends_with_its_reason_whatever_befalls
 ) -> None:
     """Takes two and a half seconds of processor, a fifth of one for each scene of half a minute."""
     monkeypatch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", Fits)
-    played = [Scene(seed, tmp_path).play() for seed in (*KEPT, *range(SCENES * budget))]
+    played = [Scene(seed, tmp_path).play() for seed in (*KEPT, *range(scenes(SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told[-20:]) for one in played if one.judge.broken] == []
