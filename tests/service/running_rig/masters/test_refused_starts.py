@@ -19,6 +19,7 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
+from tests.gate.budgets import striped
 from tests.service.running_rig.simulated_rig import ENABLE, OWNER, RESET, SELF_TEST, TAKE, TARE, SmallRig
 
 HUNG, PAGE, LEASE_S, BEAT = Peer("10.0.0.9"), Peer("web"), 0.35, 7
@@ -97,13 +98,6 @@ def _another_owner(rig: SmallRig) -> Iterator[None]:
 
 
 REASONS = (_silent_cell, _lost_output, _run_of_this_machine, _force_on_its_way_to_0, _latched_fault, _another_owner)
-EACH_BY_SOME = [
-    pytest.param(reason, face, marks=() if (row + column) % 3 == 1 else pytest.mark.long)
-    for row, reason in enumerate(REASONS)
-    for column, face in enumerate(FACES)
-]
-"""In the push gate each reason by two faces or three, and each face with two reasons: what is known of a start that was refused
-lies behind the faces."""
 
 
 def _rig(reason: Callable[[SmallRig], Iterator[None]], action: LeaseAction) -> SmallRig:
@@ -126,7 +120,7 @@ def _cycle(rig: SmallRig, face: str, beat: int) -> list[Refusal]:
     return refused
 
 
-@pytest.mark.parametrize(("reason", "face"), EACH_BY_SOME)
+@pytest.mark.parametrize(("reason", "face"), striped(REASONS, FACES))
 def test_the_refused_start_of_a_program_that_hung_begins_nothing_when_the_reason_is_over(
     face: str, reason: Callable[[SmallRig], Iterator[None]]
 ) -> None:
