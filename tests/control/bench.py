@@ -8,6 +8,7 @@ trim has something to do.
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import ceil, nan
 from random import Random
 
@@ -24,6 +25,7 @@ MOMENTARY = ControlBit.RESET_FAULT | ControlBit.TARE | ControlBit.TAKE_OWNERSHIP
 """Bits that read back as 0."""
 
 
+@cache
 def bsfm(scale: float = 1.0, span_n: float = 6.0) -> Bsfm:
     """0..8 V, 0..57 N, a loop 4 N wide; scale multiplies all forces."""
     rising = RationalBezier(0.0, 8.0, [0.0, 26.0 * scale, 57.0 * scale], [1.0, 1.0, 1.0])

@@ -52,9 +52,9 @@ def test_another_zero_of_the_cell_is_no_error_of_the_plant() -> None:
 def test_of_a_plant_that_was_changed_before_nothing_is_told() -> None:
     measurement = recorded({"friction.coulomb_n": 3.1}, time_s=times_s(30.0))
     assert diagnose([measurement], MACHINE, Options(is_own=True, without="coulomb-friction")).refit is None
-    found = diagnose([measurement], MACHINE).refit
-    assert found is not None and not found.is_own
-    assert "refit" not in diagnosis_document(diagnose([measurement], MACHINE), 1.0)
+    answer = diagnose([measurement], MACHINE)
+    assert answer.refit is not None and not answer.refit.is_own
+    assert "refit" not in diagnosis_document(answer, 1.0)
 
 
 def test_an_offset_of_a_recording_is_no_error_of_the_plant() -> None:

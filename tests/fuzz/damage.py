@@ -35,9 +35,20 @@ def pieces(stream: bytes, chance: Random) -> Iterator[bytes]:
         at += size
 
 
-def held_bytes(thing: object) -> int:
-    """Return how many bytes and list items an object of ours keeps, parts included."""
-    held, waiting, seen = 0, [thing], set[int]()
+def held_bytes(*things: object, beside: frozenset[int] = frozenset()) -> int:
+    """Return how many bytes and list items objects of ours keep, parts included. beside: `parts_of` what does not count."""
+    return _walk(things, set(beside))
+
+
+def parts_of(thing: object) -> frozenset[int]:
+    """Return the identities of an object's parts, for who asks again and again what others hold that share it."""
+    seen = set[int]()
+    _walk((thing,), seen)
+    return frozenset(seen)
+
+
+def _walk(things: tuple[object, ...], seen: set[int]) -> int:
+    held, waiting = 0, list(things)
     while waiting:
         one = waiting.pop()
         kind: Any = type(one)

@@ -1,7 +1,8 @@
-"""What the push gate leaves to the long run: what is marked `long`, and of a `sampled` table two cases in three."""
+"""What the push gate leaves to the long run: what is marked `long`, of a `sampled` table two cases in three, and as much of
+what a search draws."""
 
-from collections.abc import Iterator
-from typing import Final
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
 from zlib import crc32
 
 import hypothesis
@@ -15,6 +16,18 @@ def examples(count: int) -> int:
     """Return how many examples hypothesis draws: so many in a long run, one in three of them in the push gate."""
     is_push = hypothesis.settings.default is not None and hypothesis.settings.default.derandomize
     return -(-count // SAMPLED) if is_push else count
+
+
+def scenes(count: int, budget: int) -> int:
+    """Return how many scenes a drawn search plays: one in three of count in the push gate, budget times count in a long run."""
+    return count * budget if budget > 1 else -(-count // SAMPLED)
+
+
+def striped(rows: Iterable[Any], columns: Iterable[Any]) -> list[Any]:
+    """Return each of rows beside each of columns, as parameters of a test, of which a push runs every third diagonal: each row
+    with some columns, and each column with some rows."""
+    cells = [(row, column, (i + k) % SAMPLED == 1) for i, row in enumerate(rows) for k, column in enumerate(columns)]
+    return [pytest.param(row, column, marks=() if is_run else pytest.mark.long) for row, column, is_run in cells]
 
 
 def leave_out_long(items: list[pytest.Item], *, in_silence: bool) -> None:

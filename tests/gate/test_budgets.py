@@ -8,7 +8,7 @@ import pytest
 from hypothesis import settings
 from hypothesis._settings import local_settings
 
-from tests.gate.budgets import examples, leave_out_long
+from tests.gate.budgets import examples, leave_out_long, scenes, striped
 
 
 class Item(SimpleNamespace):
@@ -79,3 +79,14 @@ def test_what_needs_the_bigger_budget_does_not_run_without_it(in_silence: bool, 
     leave_out_long(items, in_silence=in_silence)
     assert [item.name for item in items] == left
     assert (short.marks, long.marks) == ([], ["skip"])
+
+
+def test_a_drawn_search_plays_a_third_of_its_scenes_in_a_push_and_never_none() -> None:
+    assert [scenes(count, 1) for count in (1, 2, 7, 30)] == [1, 1, 3, 10]
+    assert scenes(7, 20) == 140
+
+
+def test_of_a_striped_table_a_third_is_run_and_of_each_row_and_column_something() -> None:
+    run = [cell.values for cell in striped("abc", range(7)) if not cell.marks]
+    assert len(striped("abc", range(7))) == 21 and len(run) == 7
+    assert {row for row, _ in run} == set("abc") and {column for _, column in run} == set(range(7))

@@ -116,7 +116,7 @@ def scene() -> Iterator[Scene]:
 
 def test_a_healthy_machine_is_searched_once_and_then_only_looked_at(scene):
     scene.work(FIRST_WINDOW_S)
-    assert scene.looks(6) == [ResidualCause.NONE] * 6
+    assert scene.looks(4) == [ResidualCause.NONE] * 4
     assert scene.search.requests == 1
     assert scene.watch.counters["rms_n"] < 0.3
 
@@ -146,7 +146,7 @@ def test_more_friction_raises_the_warning_by_its_name_and_its_end_clears_it(scen
     scene.work(FIRST_WINDOW_S)
     scene.looks(2)
     scene.change(friction__coulomb_n=3.0)
-    result = scene.looks(6)
+    result = scene.looks(5)
     assert result[0] is ResidualCause.NONE, "one window is not enough"
     assert result[-1] is ResidualCause.COULOMB_FRICTION
     assert "coulomb_n 1 -> 3 N" in scene.watch.published.sentence
@@ -196,7 +196,7 @@ def test_what_no_effect_explains_is_an_unknown_cause(scene):
     scene.change(regulator__hysteresis_pa=3.0e4)
     scene.search.plant = scene.plant
     scene.search.leftover = (Leftover("time", "jumps", 0.8),)
-    assert scene.looks(5)[-1] is ResidualCause.UNKNOWN
+    assert scene.looks(4)[-1] is ResidualCause.UNKNOWN
     assert "jumps, depending on time" in scene.watch.published.sentence
 
 

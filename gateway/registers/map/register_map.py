@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property
+from functools import cached_property, lru_cache
 from json import dumps
 from typing import Any, Final
 from zlib import crc32
@@ -21,6 +21,12 @@ PLAIN_BLOCKS = ("command", "status")
 """Blocks whose registers a bare NAME means."""
 
 _DECIMALS = {"N": 2, "N/s": 1, "deg": 1, "V": 3, "s": 4}
+
+
+@lru_cache(maxsize=16)
+def _nearest(word: str, names: tuple[str, ...]) -> list[str]:
+    """Milliseconds of difflib, kept for who asks for the same wrong name again and again."""
+    return get_close_matches(word, names, 1, 0.6)
 
 
 class UnknownRegister(LookupError):  # noqa: N818  reads as what it is
@@ -215,16 +221,17 @@ class RegisterMap:
             what = "address" if register.address == int(name) else "number"
             return f" by name: {name} is the {what} of {register.name}, so use {register.name}"
         plain = [register.name for register in self.registers if register.block in PLAIN_BLOCKS]
-        names = dict.fromkeys((*self._by_name, *(register.name for register in self.registers)))
-        near = [one for one in plain if name.lower() in one.split("_")] or get_close_matches(
-            name.lower(), names, 1, 0.6
-        )
+        near = [one for one in plain if name.lower() in one.split("_")] or _nearest(name.lower(), self._names)
         return f"; did you mean {' or '.join(near)}?" if near else "; force-gateway registers lists them"
 
     def _at_number(self, number: int) -> Register | None:
         """Return the register of an address, or of the name that PLCs give it: 40103, 30103."""
         base = next((first for first in (40001, 30001) if first <= number < first + 9999), 0)
         return next((one for one in self.registers if one.address <= number - base < one.address + one.words), None)
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys((*self._by_name, *(register.name for register in self.registers))))
 
     @cached_property
     def _by_name(self) -> dict[str, Register]:

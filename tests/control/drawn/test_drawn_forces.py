@@ -6,6 +6,7 @@ A scene is one seed. The laws are the judge's own.
 
 from tests.control.drawn.scene import Scene
 from tests.control.drawn.wide_scene import WideScene
+from tests.gate.budgets import scenes
 
 SCENES = 10
 KEPT = 726, 1135, 3467, 8014, 8114, 10191, 201, 50
@@ -21,11 +22,11 @@ one the relay is stuck: no other one asks what is told then."""
 
 def test_a_force_keeps_to_its_limits_arrives_and_tells_whatever_machine_and_master_are(budget: int) -> None:
     """Takes three seconds of processor, a sixth of one for each scene of a quarter of a minute."""
-    played = [Scene(seed).play() for seed in (*KEPT, *range(SCENES * budget))]
+    played = [Scene(seed).play() for seed in (*KEPT, *range(scenes(SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []
 
 
 def test_the_same_with_pulls_stick_and_slip_creep_play_hard_contacts_and_careless_rig_files(budget: int) -> None:
     """Takes five seconds of processor, two thirds of one for each scene of a third of a minute."""
-    played = [WideScene(seed).play() for seed in (*WIDE_KEPT, *range(WIDE_SCENES * budget))]
+    played = [WideScene(seed).play() for seed in (*WIDE_KEPT, *range(scenes(WIDE_SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []

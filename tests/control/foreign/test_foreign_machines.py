@@ -18,7 +18,7 @@ from tests.control.foreign.kept_calibrations import kept
 from tests.control.foreign.machine import Machine, drawn
 from tests.control.foreign.stand import Calibrated, Stand, calibrated, settings
 
-FAST = (1, 5, 9, 18, 46)
+FAST = (1, 5, 9, 46)
 # drawn after the tuning: a short second lag, a map that flattens, a dead start that a push to 0 V runs into, friction that
 # keeps what a push went beyond its wish
 MENDED = (29, 43, 46, 72, 80, 92, 100, 203)

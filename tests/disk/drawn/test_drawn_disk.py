@@ -18,6 +18,7 @@ from tests.disk.drawn.players.store_player import CalibrationPlayer, PlantPlayer
 from tests.disk.drawn.players.upload_player import UploadPlayer
 from tests.disk.drawn.players.value_players import FilePlayer, ForceReferencePlayer, SettingsPlayer
 from tests.disk.drawn.scene import Scene, clean
+from tests.gate.budgets import scenes
 
 SMALL: list[type[Player]] = [EventsPlayer, MarkerPlayer, SettingsPlayer, ForceReferencePlayer, FilePlayer]
 LARGE: list[type[Player]] = [ArchivePlayer, UploadPlayer]
@@ -45,7 +46,7 @@ COUNTS: dict[str, tuple[list[type[Player]], int]] = {
     "all": (EVERY, 25),
     "verbs": ([Terminal, Terminal, *EVERY], 6),
 }
-"""How many scenes of each in the push gate."""
+"""How many scenes of each, of which the push gate plays one in three."""
 
 
 @pytest.mark.parametrize("which", COUNTS)
@@ -55,7 +56,7 @@ def test_what_was_said_to_be_stored_is_there_and_all_heals_with_the_disk(
     gc.freeze()  # what the tests before have left is not walked through
     kinds, count = COUNTS[which]
     broken, opened = [], _descriptors()
-    for seed in range(count * budget):
+    for seed in range(scenes(count, budget)):
         broken += [(seed, words) for words in Scene(seed, fast_folder, kinds).run().broken]
         clean(fast_folder)
     assert broken == []

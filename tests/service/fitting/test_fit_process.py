@@ -54,7 +54,8 @@ def test_a_ladder_becomes_a_numbered_calibration_with_report_and_provenance(tmp_
 
 def test_what_the_cell_of_the_rig_cannot_hold_may_not_drive_it(tmp_path: Path) -> None:
     """Handles beyond its range would be commanded, and never measured."""
-    fit = fit_recording(read_source(recorded(tmp_path)), FitRequest(), RigContext(rig="demo", state=tmp_path), "mine")
+    context = RigContext(rig="demo", state=tmp_path)
+    fit = fit_recording(read_source(recorded(tmp_path)), FitRequest(orders=(1,)), context, "mine")
     taken = calibration_of(fit, 60.0)
     assert taken.name == "mine" and taken.response == fit.measured.response
     with pytest.raises(LadderError, match=r"E401 the chosen model may not drive the rig: .* -40 \.\. 40 is allowed"):

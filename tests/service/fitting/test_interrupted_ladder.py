@@ -97,7 +97,7 @@ def test_a_fit_that_cannot_start_is_told_and_its_ladder_waits(tmp_path: Path, mo
     monkeypatch.setattr(calibration_runs, "FitLauncher", refuse)
     wired = Wired(seed=11).ready()
     runs = kept(wired, tmp_path)
-    runs.answer({"plan": {"step_v": 2.0, "groups": 1, "minor_points": 24}})
+    runs.answer({"plan": {"step_v": 2.0, "groups": 1, "minor_points": 0}})
     while runs.answer({})["phase"] not in ("refused", "fitting"):
         wired.run(0.5)
     wired.run(0.1)

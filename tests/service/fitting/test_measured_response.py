@@ -16,7 +16,7 @@ def settled_s(wired: Wired) -> list[float]:
     for target_n in TARGETS_N:
         began_s = last_s = wired.now_s
         wired.write(0, ENABLE, round(100 * target_n))
-        for now in wired.samples(1.5):
+        for now in wired.samples(1.0):
             if abs(now.twin.force_n - target_n) > 0.5:
                 last_s = now.now_s
         times_s.append(last_s - began_s)

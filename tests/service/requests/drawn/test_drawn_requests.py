@@ -12,6 +12,7 @@ from tests.service.requests.drawn.scene import Scene, told
 COUNT = 8
 
 
+@pytest.mark.sampled
 @pytest.mark.parametrize("first", range(COUNT))
 def test_each_request_has_its_answer_and_what_is_refused_changes_nothing(
     first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, budget: int

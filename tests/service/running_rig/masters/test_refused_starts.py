@@ -19,6 +19,7 @@ from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover
 from tests.control.bench import settings
+from tests.gate.budgets import striped
 from tests.service.running_rig.simulated_rig import ENABLE, OWNER, RESET, SELF_TEST, TAKE, TARE, SmallRig
 
 HUNG, PAGE, LEASE_S, BEAT = Peer("10.0.0.9"), Peer("web"), 0.35, 7
@@ -119,8 +120,7 @@ def _cycle(rig: SmallRig, face: str, beat: int) -> list[Refusal]:
     return refused
 
 
-@pytest.mark.parametrize("face", FACES)
-@pytest.mark.parametrize("reason", REASONS)
+@pytest.mark.parametrize(("reason", "face"), striped(REASONS, FACES))
 def test_the_refused_start_of_a_program_that_hung_begins_nothing_when_the_reason_is_over(
     face: str, reason: Callable[[SmallRig], Iterator[None]]
 ) -> None:
