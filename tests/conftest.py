@@ -160,7 +160,11 @@ WITH_A_CLOCK = (
 """Rooms in which some test waits for the machine's own clock, for a thread, a process or a browser: a machine that stands still
 is no fault of theirs (`tried_again`)."""
 
+IN_BROWSER = "web/tabs/in_chromium/"
+"""Whose files share one browser (its conftest.py): they are one group. To start one takes as long as three pages."""
+
 SLOW = (
+    IN_BROWSER,
     "service/closed_loop/test_study.py",
     "service/edge_table/test_edge_table.py",
     "service/fitting/test_interrupted_ladder.py",
@@ -169,13 +173,9 @@ SLOW = (
     "paper/test_paper_report.py",
     "control/foreign/test_foreign_machines.py",
     "test_compiled_folder.py",
-    "web/tabs/in_chromium/test_away_in_chromium.py",
-    "web/tabs/in_chromium/test_steering_in_chromium.py",
-    "web/tabs/in_chromium/test_tabs_in_chromium.py",
-    "web/tabs/in_chromium/test_stop_in_chromium.py",
     "web/tabs/test_calibrations_tab.py",
 )
-"""Files of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is left to one
+"""Files, and a folder, of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is
 worker at the end, nor all workers wait there."""
 
 SPREAD = (
@@ -186,13 +186,16 @@ SPREAD = (
 
 
 def group_of(nodeid: str) -> str:
-    """What one worker runs in one piece: a file, whose fixtures are then made once, or what is in real time, in two parts."""
+    """What one worker runs in one piece: a file, whose fixtures are then made once, what is in real time, in two parts, or
+    what shares a browser."""
     name = nodeid.removeprefix("tests/")
     if name.startswith(SPREAD):
         return name
     path = name.partition("::")[0]
     if path.startswith(LONG_WAITS):
         return "long waits"
+    if path.startswith(IN_BROWSER):
+        return IN_BROWSER
     return "real time" if path.startswith(REAL_TIME) else path
 
 

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from gateway.cli.main import command
 from gateway.registers.words import State
-from tests.end_to_end.conftest import POLL_S, RunningGateway, start, stop
+from tests.end_to_end.conftest import POLL_S, RunningGateway
 
 ENABLE, RESET = 1, 2
 PRECONTACT = 7
@@ -53,67 +53,19 @@ def assert_fails(running: RunningGateway, code: str) -> None:
     running.said(code)
 
 
-def test_a_silent_cell_is_rehearsed_audited_and_healed(rested: RunningGateway) -> None:
-    assert_presses(rested, 10.0)
-    assert sim(rested, "set", "cell.silent=true")["set"] == {"cell.silent": True}
-    assert_fails(rested, "A311")
-    rested.said("the simulated rig is set: cell.silent=on")
-    shown = verb(rested, "audit", "show").output
-    assert '{"set": {"cell.silent": "true"}}' in shown
-    recover(rested)
-    assert sim(rested, "list")["set"] == {}
-    assert_presses(rested, 10.0)
-
-
-def test_an_unplugged_port_is_lost_and_found_again(rested: RunningGateway) -> None:
-    assert_presses(rested, 10.0)
-    sim(rested, "set", "cell.unplug=on", "unplug=on")
-    assert_fails(rested, "E102")
-    recover(rested)
-    assert_presses(rested, 12.0)
-
-
-def test_an_effect_that_is_set_while_a_force_is_held_shows_in_the_force(rested: RunningGateway) -> None:
-    assert_presses(rested, 20.0)
-    sim(rested, "set", "supply-saturation=100000")
-    rested.wait_until(lambda status: status["force_measured"] < 1500)
-    sim(rested, "clear")
-    again = rested.wait_until(lambda status: abs(status["force_measured"] - 2000) < 150)
-    assert again["state"] != State.FAULT
-
-
-def test_what_is_set_outlives_the_simulated_rig_and_nothing_is_set_by_halves(rested: RunningGateway) -> None:
-    sim(rested, "set", "leak=0.01", "output.refuse=on")
-    os.kill(rested.ready["pids"]["rig"], signal.SIGKILL)
-    rested.said("the simulated rig is set as it was before: leak.leak_per_s=0.01, output.refuse=on", within_s=20.0)
-    refused = verb(rested, "sim", "set", "air.off=on", "creep=9")
-    assert refused.exit_code == 1
-    assert "E133 creep=9 is out of range; allowed: -1 .. 1" in refused.output
-    assert sim(rested, "list")["set"] == {"leak.leak_per_s": 0.01, "output.refuse": True}
-    recover(rested)
-    assert_presses(rested, 10.0)
-
-
-@pytest.fixture(scope="module")
-def untaught(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningGateway]:
-    """A gateway that has held no force: by the pressures of one it would know what air to expect."""
-    started = start(tmp_path_factory.mktemp("wrong") / "state", "--sim")
-    yield started
-    stop(started)
-
-
 @pytest.fixture
-def healthy(untaught: RunningGateway) -> Iterator[RunningGateway]:
-    """Heals what its test has broken."""
-    yield untaught
-    sim(untaught, "clear")
+def healthy(shared: RunningGateway) -> Iterator[RunningGateway]:
+    """Heals what its test has broken. Its tests come first: by the pressures of a force that was held the gateway would know
+    what air to expect."""
+    yield shared
+    sim(shared, "clear")
     deadline_s = time.monotonic() + 10.0
-    while untaught.status()["state"] != State.OFF:
-        untaught.write(0, 0, 0)
-        untaught.write(0, RESET, 0)
-        assert time.monotonic() < deadline_s, untaught.log.read_text()
+    while shared.status()["state"] != State.OFF:
+        shared.write(0, 0, 0)
+        shared.write(0, RESET, 0)
+        assert time.monotonic() < deadline_s, shared.log.read_text()
         time.sleep(0.05)
-    untaught.write(PRECONTACT, 0)
+    shared.write(PRECONTACT, 0)
 
 
 def provoked(gateway: RunningGateway, setting: str, force_n: float, code: str, precontact_n: float = 0.0) -> str:
@@ -157,6 +109,47 @@ def test_kgf_read_as_newtons_stops_once_the_tool_presses(healthy: RunningGateway
     said = provoked(healthy, "cell.kgf=on", 40.0, "A303", precontact_n=20.0)
     assert "kgf" in said
     assert "check the unit" in said
+
+
+def test_a_silent_cell_is_rehearsed_audited_and_healed(rested: RunningGateway) -> None:
+    assert_presses(rested, 10.0)
+    assert sim(rested, "set", "cell.silent=true")["set"] == {"cell.silent": True}
+    assert_fails(rested, "A311")
+    rested.said("the simulated rig is set: cell.silent=on")
+    shown = verb(rested, "audit", "show").output
+    assert '{"set": {"cell.silent": "true"}}' in shown
+    recover(rested)
+    assert sim(rested, "list")["set"] == {}
+    assert_presses(rested, 10.0)
+
+
+def test_an_unplugged_port_is_lost_and_found_again(rested: RunningGateway) -> None:
+    assert_presses(rested, 10.0)
+    sim(rested, "set", "cell.unplug=on", "unplug=on")
+    assert_fails(rested, "E102")
+    recover(rested)
+    assert_presses(rested, 12.0)
+
+
+def test_an_effect_that_is_set_while_a_force_is_held_shows_in_the_force(rested: RunningGateway) -> None:
+    assert_presses(rested, 20.0)
+    sim(rested, "set", "supply-saturation=100000")
+    rested.wait_until(lambda status: status["force_measured"] < 1500)
+    sim(rested, "clear")
+    again = rested.wait_until(lambda status: abs(status["force_measured"] - 2000) < 150)
+    assert again["state"] != State.FAULT
+
+
+def test_what_is_set_outlives_the_simulated_rig_and_nothing_is_set_by_halves(rested: RunningGateway) -> None:
+    sim(rested, "set", "leak=0.01", "output.refuse=on")
+    os.kill(rested.ready["pids"]["rig"], signal.SIGKILL)
+    rested.said("the simulated rig is set as it was before: leak.leak_per_s=0.01, output.refuse=on", within_s=20.0)
+    refused = verb(rested, "sim", "set", "air.off=on", "creep=9")
+    assert refused.exit_code == 1
+    assert "E133 creep=9 is out of range; allowed: -1 .. 1" in refused.output
+    assert sim(rested, "list")["set"] == {"leak.leak_per_s": 0.01, "output.refuse": True}
+    recover(rested)
+    assert_presses(rested, 10.0)
 
 
 def test_the_code_is_explained_offline_with_one_thing_to_do() -> None:

@@ -1,4 +1,4 @@
-"""For how long this machine has stood still, measured beside the tests: a process that does nothing but sleep 10 ms at a time
+"""For how long this machine has stood still, measured beside the tests: a process that does nothing but sleep 20 ms at a time
 notes by how much it has come late.
 
 What a host takes from a virtual machine the kernel counts only where the host tells it (`steal`), and a container's quota, a
@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-LOOK_S = 0.01
+LOOK_S = 0.02
 LATE_S = 0.05
 """What is shorter breaks no bound of a test, and a busy processor may make anybody wait for it."""
 _NOTE = struct.Struct("dd")  # lost, and when it last looked

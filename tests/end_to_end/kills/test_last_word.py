@@ -78,18 +78,6 @@ def stopping(gateway: RunningGateway, devices: OwnDevices, signal_number: int, *
     return began_s
 
 
-def test_what_ctrl_c_ramps_a_second_one_cuts(patient, patient_devices):
-    began_s = stopping(patient, patient_devices, signal.SIGINT)
-    on_the_way = [heard.voltage_v for heard in patient_devices.settings_since(began_s)]
-    assert all(after <= before for before, after in pairwise(on_the_way))
-    assert on_the_way[-1] > 0.5, "still on the ramp"
-    cut_s = time.monotonic()
-    patient.process.send_signal(signal.SIGINT)
-    assert patient_devices.until_safe(cut_s) < 0.3
-    assert patient.process.wait(3) == 0
-    assert patient_devices.heard[-1].voltage_v == 0.0
-
-
 def test_a_stop_that_every_process_is_asked_for_has_its_ramp(patient, patient_devices):
     """As a machine does that shuts down, a session that ends, or `pkill -f`: control died of it, and the force fell at once."""
     began_s = stopping(patient, patient_devices, signal.SIGTERM, *patient.ready["pids"].values())
@@ -221,6 +209,19 @@ def test_an_unplugged_regulator_is_a_fault_and_its_successor_hears_the_safe_volt
     os.kill(rested.ready["pids"]["control"], signal.SIGKILL)
     assert shared_devices.until_safe(killed_at_s) < 0.5
     restarted(rested)
+
+
+def test_what_ctrl_c_ramps_a_second_one_cuts(rested, shared_devices):
+    """The last one of the gateway that they share."""
+    began_s = stopping(rested, shared_devices, signal.SIGINT)
+    on_the_way = [heard.voltage_v for heard in shared_devices.settings_since(began_s)]
+    assert all(after <= before for before, after in pairwise(on_the_way))
+    assert on_the_way[-1] > 0.5, "still on the ramp"
+    cut_s = time.monotonic()
+    rested.process.send_signal(signal.SIGINT)
+    assert shared_devices.until_safe(cut_s) < 0.3
+    assert rested.process.wait(3) == 0
+    assert shared_devices.heard[-1].voltage_v == 0.0
 
 
 def deleted_terminals(pid: int) -> list[str]:

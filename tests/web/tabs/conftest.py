@@ -1,4 +1,4 @@
-"""What the tests of the tabs share: a state directory with a recording, the page on it, and a browser."""
+"""What the tests of the tabs share: a state directory with a recording, and the page on it."""
 
 import math
 from collections.abc import Iterator
@@ -8,7 +8,6 @@ from typing import Any
 import pytest
 
 from gateway.recording import Recorder
-from tests.browser import BROWSER, NO_BROWSER, started_browser
 from tests.web.tabs.scripted_control import ScriptedControl, modbus, scripted_control
 from tests.web.tabs.served_tabs import ServedPage, serve
 
@@ -56,20 +55,3 @@ def served(control: ScriptedControl) -> ScriptedControl:
 def page(state: Path) -> Iterator[ServedPage]:
     with serve(state) as page:
         yield page
-
-
-@pytest.fixture(scope="module")
-def started_chromium() -> Iterator[Any]:
-    """A browser without a window, once for a file; skipped where there is none."""
-    if BROWSER is None:
-        pytest.skip(NO_BROWSER)
-    with started_browser() as browser:
-        yield browser
-
-
-@pytest.fixture
-def chromium(started_chromium: Any) -> Iterator[Any]:
-    """The browser, of which no window, cookie or stored word is left to the next test."""
-    yield started_chromium
-    for context in started_chromium.contexts:
-        context.close()

@@ -7,7 +7,7 @@ import socket
 import threading
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from http.cookiejar import CookieJar
 from pathlib import Path
@@ -33,10 +33,10 @@ class Answer:
 
 
 class ServedPage:
-    """A browser's requests: with its session, and with the token that commands need. context: what the page shares."""
+    """A browser's requests: with its session, and with the token that commands need. hang_up: closes what nobody asks by."""
 
-    def __init__(self, address: str) -> None:
-        self.address = address
+    def __init__(self, address: str, hang_up: Callable[[], Any]) -> None:
+        self.address, self.hang_up = address, hang_up
         self._browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
         self.csrf = ""
 
@@ -65,8 +65,14 @@ def serve(state: Path, rig: str = "demo") -> Iterator[ServedPage]:
     listener = socket.create_server(("127.0.0.1", 0))
     host, port = listener.getsockname()
     servers: list[uvicorn.Server] = []
+    loops: list[asyncio.AbstractEventLoop] = []
+
+    def hang_up() -> None:
+        for connection in servers[0].server_state.connections.copy():
+            connection.shutdown()
 
     async def run() -> None:
+        loops.append(asyncio.get_running_loop())
         context = WebContext(state, rig, True, ControlLink(state))
         config = uvicorn.Config(
             make_app(context, PageAccess(host, port), None), log_config=None, timeout_graceful_shutdown=2
@@ -77,7 +83,7 @@ def serve(state: Path, rig: str = "demo") -> Iterator[ServedPage]:
     thread = threading.Thread(target=lambda: asyncio.run(run()))
     thread.start()
     try:
-        yield ServedPage(f"http://{host}:{port}")
+        yield ServedPage(f"http://{host}:{port}", lambda: loops[0].call_soon_threadsafe(hang_up))
     finally:
         servers[0].should_exit = True
         thread.join(30)

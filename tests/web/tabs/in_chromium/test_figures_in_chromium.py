@@ -11,7 +11,6 @@ from gateway.live.live_state import LiveAlarm, LiveLine, LiveLoop, LiveState
 from gateway.registers.writes.ownership import NOT_IPV4
 from gateway.web.register_table import register_table
 from tests.service.rigs import demo
-from tests.web.tabs.in_chromium.test_tabs_in_chromium import open_tab
 
 SAMPLES = """async () => {
   const { samples } = await import("/static/live/samples.js");
@@ -85,8 +84,8 @@ def state(**facts: Any) -> dict[str, Any]:
     return LiveState(rig="demo", simulated=True, version="0", time_unix_s=1000.0, state="fault", **facts).to_json()
 
 
-def test_samples_are_of_this_machine_and_of_the_last_minute_and_say_when_they_are_old(window: Any) -> None:
-    told = window.evaluate(SAMPLES)
+def test_samples_are_of_this_machine_and_of_the_last_minute_and_say_when_they_are_old(quiet: Any) -> None:
+    told = quiet.evaluate(SAMPLES)
     assert not told["empty"]
     assert told["fresh"] == [True, 102.5, 897.5]
     assert told["old"] == [False, 106.5, 897.5], "the clock goes on where no sample comes"
@@ -96,10 +95,10 @@ def test_samples_are_of_this_machine_and_of_the_last_minute_and_say_when_they_ar
     assert told["marks"] == [60, "W99", 49], "the newest sixty, at the gateway's own time"
 
 
-def test_shares_and_times_of_lines_and_loop_are_counted_as_their_units_say(window: Any) -> None:
+def test_shares_and_times_of_lines_and_loop_are_counted_as_their_units_say(quiet: Any) -> None:
     line = LiveLine(device="itv", asked=900, heard=600, garbled=200, age_s=0.2)
     loop = LiveLoop(hz=100.0, ticks=2000, missed=10, late_p50_us=250, late_p99_us=12_400, step_us=1_500.0)
-    told = window.evaluate(HEALTH, state(output=line, load_cell=replace(line, device="cell", age_s=None), loop=loop))
+    told = quiet.evaluate(HEALTH, state(output=line, load_cell=replace(line, device="cell", age_s=None), loop=loop))
     assert told == {
         "Loop": "100 Hz, 1.50 ms of work",
         "Lateness": "half under 0.25 ms, 99 % under 12 ms",
@@ -107,18 +106,18 @@ def test_shares_and_times_of_lines_and_loop_are_counted_as_their_units_say(windo
         "Output, itv": "answers; 600 heard, 200 garbled (25.00 %)",
         "Load cell, cell": "never heard; 600 heard, 200 garbled (25.00 %)",
     }
-    valve = window.evaluate(HEALTH, state(valve=replace(line, device="relay", age_s=5000.0)))
+    valve = quiet.evaluate(HEALTH, state(valve=replace(line, device="relay", age_s=5000.0)))
     assert valve["Valve, relay"].startswith("silent for 83 min;")
 
 
-def test_each_alarm_says_how_long_it_stands_itself(window: Any) -> None:
+def test_each_alarm_says_how_long_it_stands_itself(quiet: Any) -> None:
     fault = LiveAlarm(code="A311", title="one", cure="Look.", since_unix_s=990.0)
     warning = replace(fault, code="A342", title="two", since_unix_s=900.0)
-    told = window.evaluate(AGES, state(faults=(fault,), warnings=(warning,)))
+    told = quiet.evaluate(AGES, state(faults=(fault,), warnings=(warning,)))
     assert told == [["fault", "A311 one", "for 10 s"], ["warning", "A342 two", "for 1 min"]]
 
 
-def test_an_error_is_that_of_the_way_on_which_it_was_made_and_of_the_direction_that_pulls(window: Any) -> None:
+def test_an_error_is_that_of_the_way_on_which_it_was_made_and_of_the_direction_that_pulls(quiet: Any) -> None:
     """1 N too much while it climbs, 2 N while it falls; pulled, the force is measured negative and the setpoint is not."""
     applied_n = [5.0 + 0.1 * k for k in range(40)] + [8.8 - 0.1 * k for k in range(40)]
     columns = {
@@ -129,18 +128,18 @@ def test_an_error_is_that_of_the_way_on_which_it_was_made_and_of_the_direction_t
         "pulling": [0.0] * 80,
     }
     said = "RMS 1.00 N rising, 2.00 N falling, last minute."
-    assert window.evaluate(ERRORS, columns) == said
+    assert quiet.evaluate(ERRORS, columns) == said
     pulled = columns | {"pulling": [1.0] * 80, "force_n": [-value for value in columns["force_n"]]}
-    assert window.evaluate(ERRORS, pulled) == said
-    assert window.evaluate(ERRORS, columns | {"state": [1.0] * 80}).startswith("No force was wanted")
+    assert quiet.evaluate(ERRORS, pulled) == said
+    assert quiet.evaluate(ERRORS, columns | {"state": [1.0] * 80}).startswith("No force was wanted")
 
 
-def test_the_band_lies_about_what_is_wanted_on_its_side_of_zero(window: Any) -> None:
+def test_the_band_lies_about_what_is_wanted_on_its_side_of_zero(quiet: Any) -> None:
     columns = {
         "time_s": [0.0, 1.0, 2.0], "force_n": [8.1, -8.2, 0.1],
         "setpoint_n": [8.0, 8.0, 0.0], "pulling": [0.0, 1.0, 0.0],
     }  # fmt: skip
-    _, low, high, measured, wanted = window.evaluate(TREND, {"columns": columns, "tolerance_n": 0.5})
+    _, low, high, measured, wanted = quiet.evaluate(TREND, {"columns": columns, "tolerance_n": 0.5})
     assert (wanted, low, high) == ([8.0, -8.0, None], [7.5, -8.5, None], [8.5, -7.5, None])
     assert measured == columns["force_n"]
 
@@ -159,15 +158,13 @@ SHOWN = """async ({ map, words }) => {
     ("number", "words"),
     [(0, "nobody"), (2, "serial:2"), (0x0A000005, "10.0.0.5"), (NOT_IPV4, "somebody without an IPv4 address")],
 )
-def test_the_owner_is_told_as_in_a_terminal(page, chromium, number: int, words: str) -> None:
+def test_the_owner_is_told_as_in_a_terminal(quiet: Any, number: int, words: str) -> None:
     rig = demo()
     register, block = rig.register_map.find("owner_ip"), rig.register_map.block("status")
     place = register.address - block.first
     status = [0] * block.words
     status[place : place + 2] = [number >> 16, number & 0xFFFF]
-    window: Any = open_tab(chromium, page.address, "wiring")
-    assert window.evaluate(SHOWN, {"map": register_table(rig, 5020), "words": status}) == words
-    window.close()
+    assert quiet.evaluate(SHOWN, {"map": register_table(rig, 5020), "words": status}) == words
 
 
 TOLD = """async ({ map, words }) => {
@@ -199,7 +196,7 @@ TOLD = """async ({ map, words }) => {
 }"""
 
 
-def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_same(page, chromium) -> None:
+def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_same(quiet: Any) -> None:
     """12.34 N with the words exchanged is 1e-38, and one register beside the force is another force."""
     rig = demo()
     floats = {"force_measured": -12.34, "model_residual": 0.5, "pressure": 450.0}
@@ -211,8 +208,7 @@ def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_s
         for block, pair in (("float_abcd", [high, low]), ("float_cdab", [low, high])):
             words[block][32 + 2 * place : 34 + 2 * place] = pair
     words["status"][rig.register_map.find("pressure").address - 100] = 0x8000
-    window: Any = open_tab(chromium, page.address, "wiring")
-    found = window.evaluate(TOLD, {"map": register_table(rig, 5020), "words": words})
+    found = quiet.evaluate(TOLD, {"map": register_table(rig, 5020), "words": words})
     assert found["told"] == {
         ":force_measured": "-12.34 N", ":model_residual": "0.50 N", ":pressure": "not known",
         "float_abcd:force_measured": "-12.34 N", "float_abcd:model_residual": "0.50 N", "float_abcd:pressure": "450.00 kPa",
@@ -223,7 +219,6 @@ def test_words_are_read_in_their_order_and_unit_and_the_line_to_copy_reads_the_s
         "mbpoll -1 -p 5020 -t 4:float -B -r 237 127.0.0.1",
         "mbpoll -1 -p 5020 -t 4:float -r 337 127.0.0.1",
     ]
-    window.close()
 
 
 FOLDED = """async (map) => {
@@ -242,12 +237,10 @@ FOLDED = """async (map) => {
 }"""
 
 
-def test_a_name_goes_on_behind_an_underscore_on_a_telephone(page, chromium) -> None:
+def test_a_name_goes_on_behind_an_underscore_on_a_telephone(quiet: Any) -> None:
     """It stood there as `voltage_setpoin` and `t`."""
-    browser = chromium.new_context(viewport={"width": 390, "height": 844})
-    browser.route("**/events?*", lambda route: route.abort())
-    window: Any = open_tab(browser, page.address, "wiring")
-    assert window.evaluate(FOLDED, register_table(demo(), 5020)) == ["voltage_", "setpoint"]
+    quiet.set_viewport_size({"width": 390, "height": 844})
+    assert quiet.evaluate(FOLDED, register_table(demo(), 5020)) == ["voltage_", "setpoint"]
 
 
 LINES = """async ({ map, words }) => {
@@ -267,14 +260,12 @@ LINES = """async ({ map, words }) => {
 }"""
 
 
-def test_of_another_unit_each_line_to_copy_says_which_and_reads_both_words_of_a_long_number(page, chromium) -> None:
+def test_of_another_unit_each_line_to_copy_says_which_and_reads_both_words_of_a_long_number(quiet: Any) -> None:
     """Without its own unit a gateway behind a bridge is silent, and of a long number one half is any number."""
     rig = demo()
     block = rig.register_map.block("status")
     status = [0] * block.words
     status[rig.register_map.find("force_measured").address - block.first] = 0x8000
-    window: Any = open_tab(chromium, page.address, "wiring")
-    found = window.evaluate(LINES, {"map": register_table(rig, 5020) | {"unit": 17}, "words": status})
+    found = quiet.evaluate(LINES, {"map": register_table(rig, 5020) | {"unit": 17}, "words": status})
     assert found["owner_ip"][1] == "mbpoll -1 -p 5020 -a 17 -t 4:int -B -r 117 127.0.0.1"
     assert found["force_measured"] == ["not known", "mbpoll -1 -p 5020 -a 17 -r 103 127.0.0.1"]
-    window.close()

@@ -133,11 +133,11 @@ def test_what_was_done_is_said_for_a_while_and_what_went_wrong_until_the_next(wi
     assert window.evaluate(SAID) == ["Enabled with 12.00 N.", "", "W204 out of range", "mbpoll -1"]
 
 
-def test_an_alarm_says_how_long_it_stands_and_the_keyboard_stays_beside_it(window) -> None:
+def test_an_alarm_says_how_long_it_stands_and_the_keyboard_stays_beside_it(quiet) -> None:
     """For ten seconds it stood `for 0 s`; behind a reset the focus was nowhere, and Tab began at the top."""
     silent = LiveAlarm(code="A311", title="no fresh force sample", cure="Look.", since_unix_s=98.0)
     states = [state(faults=(silent,)), state(faults=(silent,), time_unix_s=103.5), state(state="off")]
-    seen = window.evaluate(ALARMS, [one.to_json() for one in states])
+    seen = quiet.evaluate(ALARMS, [one.to_json() for one in states])
     assert seen["told"] == [[["for 2 s"], True], [["for 5 s"], True], [[], False]]
     assert seen["focused"] == "OL"
 
@@ -159,35 +159,35 @@ WATCHED = """async (states) => {
 }"""
 
 
-def test_the_watch_says_what_differs_or_why_it_does_not_judge(window) -> None:
+def test_the_watch_says_what_differs_or_why_it_does_not_judge(quiet) -> None:
     """Beside a rig at rest an empty line could mean that all is well."""
     told = [LiveResidual(), LiveResidual(why_skipped="nothing was commanded")]
     told.append(replace(told[1], sentence="friction has doubled"))
-    assert window.evaluate(WATCHED, [state(residual=one).to_json() for one in told]) == [
+    assert quiet.evaluate(WATCHED, [state(residual=one).to_json() for one in told]) == [
         "",
         "Residual watch: not judged: nothing was commanded",
         "Residual watch: friction has doubled",
     ]
 
 
-def test_to_acknowledge_a_fault_resets_it_and_a_warning_needs_none(window) -> None:
+def test_to_acknowledge_a_fault_resets_it_and_a_warning_needs_none(quiet) -> None:
     silent = LiveAlarm(code="A311", title="no fresh force sample", cure="Look.", since_unix_s=98.0)
     warned = state(faults=(silent,), warnings=(replace(silent, code="A342"),))
-    assert window.evaluate(ACKNOWLEDGED, warned.to_json()) == ["/api/v1/command/reset"]
+    assert quiet.evaluate(ACKNOWLEDGED, warned.to_json()) == ["/api/v1/command/reset"]
 
 
-def test_a_fault_is_answered_on_the_page_by_the_pages_own_button(window) -> None:
+def test_a_fault_is_answered_on_the_page_by_the_pages_own_button(quiet) -> None:
     """Beside `Acknowledge and reset` it said `write force_setpoint 0, then raise control_word bit 1`."""
     silent = LiveAlarm(code="A311", title="no fresh force sample", cure="Look.", since_unix_s=98.0)
     blocked = state(faults=(silent,), enable_block="W212 a fault is latched: raise control_word bit 1")
-    assert window.evaluate(BLOCKED, blocked.to_json()).endswith("acknowledge and reset it under Alarms.")
+    assert quiet.evaluate(BLOCKED, blocked.to_json()).endswith("acknowledge and reset it under Alarms.")
     other = replace(blocked, faults=(), state="off", enable_block="W213 the cell is silent")
-    assert window.evaluate(BLOCKED, other.to_json()) == "W213 the cell is silent"
+    assert quiet.evaluate(BLOCKED, other.to_json()) == "W213 the cell is silent"
 
 
-def test_a_trend_shows_the_setpoint_of_a_force_that_is_held_and_nothing_where_nobody_measured(window) -> None:
+def test_a_trend_shows_the_setpoint_of_a_force_that_is_held_and_nothing_where_nobody_measured(quiet) -> None:
     """The one was hidden behind the other; across a silence of the cell went a straight line of forces."""
-    drawn = window.evaluate(TREND)
+    drawn = quiet.evaluate(TREND)
     assert drawn["wanted"] in [pixel[:3] for pixel in drawn["held"]]
     assert {pixel[3] for pixel in drawn["silent"]} == {0}
     assert drawn["word"]["x"] + drawn["word"]["width"] < drawn["line"], "a code is beside its own line, not across it"
@@ -199,9 +199,9 @@ def test_a_gateway_that_is_away_is_told_in_our_words(window) -> None:
     assert window.evaluate(UNREACHED) == ["no answer from the gateway"] * 2
 
 
-def test_setpoint_error_and_range_go_with_the_pull(window) -> None:
+def test_setpoint_error_and_range_go_with_the_pull(quiet) -> None:
     """Its trend stood still while a tool pulled, for the ring held no row of it."""
-    drawn = window.evaluate(PULLED)
+    drawn = quiet.evaluate(PULLED)
     assert (drawn["low"], drawn["wanted"], drawn["high"]) == (-13.0, -12.0, -11.0)
     assert (drawn["force"], drawn["pushed"]) == (-11.8, 12.0)
     assert drawn["error"] == "RMS 0.16 N rising, last minute."

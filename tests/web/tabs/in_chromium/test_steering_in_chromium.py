@@ -43,48 +43,40 @@ SILENCE = """async () => {
     ids=["pushing", "pulling", "no sample"],
 )
 def test_the_force_is_that_of_now_and_the_error_of_a_pull_is_that_of_a_push(
-    page, chromium, status: tuple[str, ...], measured_n: float | None, force: str, error: str
+    quiet: Any, status: tuple[str, ...], measured_n: float | None, force: str, error: str
 ) -> None:
     """Of a cell that is silent the ring holds no sample: the last one is old."""
     force_state = LiveForce(requested_n=12.0, measured_n=measured_n, voltage_v=1.5)
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
-    window: Any = open_tab(chromium, page.address, "wiring")
-    shown, _ = window.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
+    shown, _ = quiet.evaluate(FIGURES, replace(base, status=status, force=force_state).to_json())
     assert shown == [force, "12.00", error, "1.500"]
-    window.close()
 
 
-def test_the_error_is_that_of_the_force_beside_it(page, chromium) -> None:
+def test_the_error_is_that_of_the_force_beside_it(quiet: Any) -> None:
     """Samples come 15 times a second, a state twice: 14.81 N beside a setpoint of 15 N had an error of +0.10 N."""
     force_state = LiveForce(requested_n=12.0, measured_n=11.98, voltage_v=1.5)
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding")
-    window: Any = open_tab(chromium, page.address, "wiring")
-    _, shown = window.evaluate(FIGURES, replace(base, status=("enabled",), force=force_state).to_json())
+    _, shown = quiet.evaluate(FIGURES, replace(base, status=("enabled",), force=force_state).to_json())
     assert shown == ["12.50", "12.00", "0.50", "1.500"]
-    window.close()
 
 
-def test_time_goes_on_on_the_page_where_no_sample_comes(page, chromium) -> None:
+def test_time_goes_on_on_the_page_where_no_sample_comes(window: Any) -> None:
     """Of a silent cell the trend showed its last force as that of now, the fault that it was ahead of it, and the loop's
     green point stood at a force that nobody measured."""
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    window: Any = open_tab(browser, page.address, "wiring")
     assert window.evaluate(SILENCE) == [[100.4, True, 5000.0], [129.0, False, 5000.0]]
-    browser.close()
 
 
-@pytest.mark.parametrize(
-    ("typed", "force_n", "said"),
-    [
-        ("1,5", 1.5, "Enabled with 1.50 N."),
-        (" 12.5 ", 12.5, "Enabled with 12.50 N."),
-        ("1,500.0", None, "A force in newtons, such as 12.5."),
-        ("12 N", None, "A force in newtons, such as 12.5."),
-        ("", None, "A force in newtons, such as 12.5."),
-    ],
+NO_FORCE = "A force in newtons, such as 12.5."
+TYPED = (
+    ("1,5", 1.5, "Enabled with 1.50 N."),
+    (" 12.5 ", 12.5, "Enabled with 12.50 N."),
+    ("1,500.0", None, NO_FORCE),
+    ("12 N", None, NO_FORCE),
+    ("", None, NO_FORCE),
 )
-def test_a_force_is_the_one_that_was_typed(page, chromium, typed: str, force_n: float | None, said: str) -> None:
+
+
+def test_a_force_is_the_one_that_was_typed(page, chromium) -> None:
     """The field dropped a comma as it was typed: who wanted 1,5 N pressed with 15 N."""
     window: Any = open_tab(chromium, page.address, "live")
     asked: list[Any] = []
@@ -95,11 +87,14 @@ def test_a_force_is_the_one_that_was_typed(page, chromium, typed: str, force_n: 
 
     window.route("**/api/v1/command/enable", answer)
     field = window.get_by_label("Setpoint, N")
-    field.select_text()
-    window.keyboard.type(typed or "\b")
-    field.press("Enter")
-    window.locator("#said").get_by_text(said).wait_for()
-    assert asked == ([] if force_n is None else [{"force_n": force_n}])
+    for typed, force_n, said in TYPED:
+        window.evaluate("() => { document.getElementById('said').textContent = ''; }")
+        field.select_text()
+        window.keyboard.type(typed) if typed else field.press("Delete")
+        field.press("Enter")
+        window.locator("#said").get_by_text(said).wait_for()
+        assert asked == ([] if force_n is None else [{"force_n": force_n}]), typed
+        asked.clear()
     window.close()
 
 
@@ -168,7 +163,7 @@ TOLD = """async ({ own, others }) => {
 }"""
 
 
-def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -> None:
+def test_figures_samples_and_commands_are_those_that_were_told(quiet: Any) -> None:
     """A line whose messages are all heard was 99 % garbled, and Set beside another's force was refused as a setpoint."""
     own = LiveState(
         rig="demo", simulated=True, version="0", time_unix_s=0.0, state="holding", status=("enabled",), owner="web",
@@ -177,10 +172,7 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
         valve=LiveLine(device="relay", heard=7, age_s=2.5),
         force=LiveForce(requested_n=12.0),
     )  # fmt: skip
-    browser = chromium.new_context()
-    browser.route("**/events?*", lambda route: route.abort())
-    window: Any = open_tab(browser, page.address, "wiring")
-    told = window.evaluate(TOLD, {"own": own.to_json(), "others": replace(own, owner="10.0.0.5").to_json()})
+    told = quiet.evaluate(TOLD, {"own": own.to_json(), "others": replace(own, owner="10.0.0.5").to_json()})
     assert told["rows"] == [
         ["Loop", "100 Hz, 0.25 ms of work"],
         ["Lateness", "half under 0.06 ms, 99 % under 12 ms"],
@@ -191,7 +183,6 @@ def test_figures_samples_and_commands_are_those_that_were_told(page, chromium) -
     ]
     assert told["columns"] == {"time_s": [1, 2, 3, 4], "force_n": [10, 20, 30, 40]}
     assert told["asked"] == ["setpoint", "enable"]
-    browser.close()
 
 
 RECORD = """async (states) => {
@@ -207,11 +198,9 @@ RECORD = """async (states) => {
 }"""
 
 
-def test_the_button_of_a_recording_does_what_it_says(page, chromium) -> None:
+def test_the_button_of_a_recording_does_what_it_says(quiet: Any) -> None:
     """One that asked for a recording under way once more would never have ended it."""
     base = LiveState(rig="demo", simulated=True, version="0", time_unix_s=0.0, state="off")
     states = [base, replace(base, recording=LiveRecording(on=True, number=1))]
-    window: Any = open_tab(chromium, page.address, "wiring")
-    asked = window.evaluate(RECORD, [each.to_json() for each in states])
+    asked = quiet.evaluate(RECORD, [each.to_json() for each in states])
     assert asked == [["/api/v1/command/record", {"on": True}], ["/api/v1/command/record", {"on": False}]]
-    window.close()
