@@ -19,16 +19,8 @@ from tests.service.edge_table.windows import assert_as_the_rules_say, future, is
 from tests.service.running_rig.simulated_rig import SmallRig
 
 STANDS = [
-    pytest.param(
-        place,
-        leased,
-        id=f"{place.name}{', leased' * leased}",
-        marks=() if leased is place.leases[0] else pytest.mark.long,
-    )
-    for place in PLACES
-    for leased in place.leases
+    pytest.param(place, leased, id=f"{place.name}{', leased' * leased}") for place in PLACES for leased in place.leases
 ]
-"""In the push gate each place once; of its rig with a lease too, where there is one without, the page's rows are asked."""
 
 
 def standing(rig: SmallRig) -> tuple[object, ...]:

@@ -33,8 +33,8 @@ def test_what_hangs_begins_nothing_and_what_goes_on_has_its_force(first: int, bu
         assert scene.rig.trace
 
 
-def begun(kept: dict[str, Any] | None = None) -> SmallRig:
-    rig, facts = SmallRig(settings(lease_s=LEASE_S)), {} if kept is None else kept
+def begun(kept: dict[str, Any] | None = None, **supervision: object) -> SmallRig:
+    rig, facts = SmallRig(settings(lease_s=LEASE_S, **supervision)), {} if kept is None else kept
     Handover(dict(facts), record=False).restore_held(rig.bank, rig.now(), lambda **told: facts.update(told))
     rig.beats = False
     return rig.run(0.5)

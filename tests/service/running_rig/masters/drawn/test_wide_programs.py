@@ -6,6 +6,7 @@ import pytest
 
 from gateway.codes.faults import FaultCode
 from gateway.codes.refusals import RefusalReason
+from gateway.control import LeaseAction
 from gateway.modbus import Peer
 from gateway.registers.words import State
 from tests.service.running_rig.masters.drawn.laws import LEASE_S
@@ -63,6 +64,28 @@ def test_what_hung_begins_by_no_frame_without_a_heartbeat_that_its_pool_brings_n
     assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     rig.write(1, 1200, 0, 0, 6, peer=first)
     assert rig.answer(0, ENABLE, peer=second) is None, "its program goes on"
+
+
+def test_a_zero_of_enable_that_comes_with_the_bit_of_a_tare_lets_no_refused_start_go() -> None:
+    """What came behind it was taken for a new one."""
+    rig = begun()
+    rig.write(0, ENABLE, 1200, 0, 0, 90, peer=OTHER)
+    assert rig.answer(1, 0, 0, 0, 1) and rig.answer(0, TARE), "another one owns"
+    rig.write(0, 0, 0, 0, 0, 91, peer=OTHER)
+    refused = rig.answer(0, ENABLE)
+    assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
+    assert rig.answer(0, ENABLE, 1200, 0, 0, 2) is None, "its program goes on"
+
+
+def test_who_stands_still_does_not_own_what_ramps_down_for_a_lost_master() -> None:
+    """Another one was refused for an owner of whom nothing came any more."""
+    rig = begun(lease_action=LeaseAction.RAMP)
+    rig.write(0, ENABLE, 1200, 0, 0, 51, peer=OTHER)
+    rig.run(0.25).answer(0, ENABLE | TARE, 1200, 0, 0, 91, peer=Peer(OTHER.host, OTHER.port + 1))
+    assert rig.run(0.1).state is State.RAMPING and rig.bank.owner is None
+    assert rig.answer(0, ENABLE, peer=OTHER) is None
+    assert rig.bank.owner is None
+    assert rig.answer(0, ENABLE, 1200, 0, 0, 2) is None, "there is no owner, and this program goes on"
 
 
 def test_behind_a_refused_start_a_program_beside_it_on_its_host_tares() -> None:
