@@ -21,12 +21,12 @@ one the relay is stuck: no other one asks what is told then."""
 
 
 def test_a_force_keeps_to_its_limits_arrives_and_tells_whatever_machine_and_master_are(budget: int) -> None:
-    """Takes three seconds of processor, a sixth of one for each scene of a quarter of a minute."""
+    """A scene of a quarter of a minute takes a sixth of a second of processor."""
     played = [Scene(seed).play() for seed in (*KEPT, *range(scenes(SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []
 
 
 def test_the_same_with_pulls_stick_and_slip_creep_play_hard_contacts_and_careless_rig_files(budget: int) -> None:
-    """Takes five seconds of processor, two thirds of one for each scene of a third of a minute."""
+    """A scene of a third of a minute takes two thirds of a second of processor."""
     played = [WideScene(seed).play() for seed in (*WIDE_KEPT, *range(scenes(WIDE_SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told) for one in played if one.judge.broken] == []

@@ -24,7 +24,7 @@ the last one another calibration is put to use before a ladder, which its record
 def test_a_run_keeps_to_what_it_states_and_ends_with_its_reason_whatever_befalls_it(
     tmp_path: Path, budget: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Takes two and a half seconds of processor, a fifth of one for each scene of half a minute."""
+    """A scene of half a minute takes a fifth of a second of processor."""
     monkeypatch.setattr("gateway.service.running_rig.calibration_runs.FitLauncher", Fits)
     played = [Scene(seed, tmp_path).play() for seed in (*KEPT, *range(scenes(SCENES, budget)))]
     assert [(one.seed, one.judge.broken, one.told[-20:]) for one in played if one.judge.broken] == []
