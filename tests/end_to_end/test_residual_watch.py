@@ -107,7 +107,7 @@ def test_a_dead_watch_is_started_again_and_control_does_not_notice(watched):
     missed, guardian = missed_of_its_own(watched), psutil.Process(watched.process.pid)
     (watch,) = watches_of(guardian)  # another one than at the start where this is tried again
     watch.send_signal(signal.SIGKILL)
-    watched.said("A346 the residual watch ended (signal 9): it is started again in 5 s")
+    watched.said("A346 the residual watch ended (SIGKILL): it is started again in 5 s")
     assert watched.status()["state"] == 3
     deadline_s = time.monotonic() + 20.0
     while not [one for one in watches_of(guardian) if one != watch]:
