@@ -176,7 +176,7 @@ SLOW = (
     "web/tabs/test_calibrations_tab.py",
 )
 """Files, and a folder, of more than ten seconds of processor, or that wait as long for a browser: begun first, so that none is
-worker at the end, nor all workers wait there."""
+left to one worker at the end, nor all workers wait there."""
 
 SPREAD = (
     "hidden_effects/test_hidden_effects.py::test_a_recording_gets_an_answer[",
