@@ -2,6 +2,7 @@
 that is not what its word is."""
 
 import struct
+from collections.abc import Sequence
 from math import inf, nan
 
 import pytest
@@ -127,6 +128,19 @@ def test_two_masters_who_take_a_target_from_each_other_or_let_it_go_have_none(
     witness = TargetWitness(observer)
     for number in range(9):
         witness.note_write(f"10.0.0.{1 + number % masters}", write_pdu(address, 2000), 1000.0 + 0.5 * number)
+        look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
+    assert bool(observer.broken) is is_seen
+
+
+@pytest.mark.parametrize(("weights", "is_seen"), [((0,) * 9, True), ((300,) * 9, True), (range(0, 900, 100), False)])
+def test_a_force_that_is_missed_by_another_weight_than_before_is_missed_anew(
+    weights: Sequence[int], is_seen: bool
+) -> None:
+    """Not where the same one is told again and again."""
+    observer = Observer(BOUNDS)
+    witness = TargetWitness(observer)
+    for number, weight in enumerate(weights):
+        witness.note_write("10.0.0.1", write_pdu(9, weight), 1000.0 + 0.5 * number)
         look_at_target(witness, 0.5, 1000.0 + 0.5 * number, measured=1700)
     assert bool(observer.broken) is is_seen
 

@@ -10,6 +10,8 @@ from tests.simulation.masters.spelling import ENABLE, control_of, word_of
 IN_BAND, SWITCHING, UNREACHABLE = 1 << 3, 1 << 9, 1 << 1
 COUNT_N = 0.01
 BAND, BAND_TIME = 11, 12
+WEIGHTS = 6, 9
+"""Tilt and payload."""
 LEAST_N, HELD_OFF_S = 5.0, 3.5
 """A target of so much, missed for so long: two seconds, and what a smoothed reading takes."""
 BAND_N, MORE_N, LOOKS = 1.0, 1.0, 4
@@ -31,12 +33,17 @@ class TargetWitness:
 
     def __init__(self, observer: Observer) -> None:
         self._observer = observer
+        self._weights = dict[int, float]()
 
     def note_write(self, writer: str, pdu: bytes, at_s: float) -> None:
         """Note whose write was taken at at_s: two masters who take the force from each other, or let it go, each have theirs
-        between two looks; and what is in another band is not judged by the one before."""
+        between two looks; what is in another band is not judged by the one before; and by another weight a force is read as
+        another one, which is missed anew."""
         control = control_of(pdu)
-        if writer != self._writer or (control is not None and not control & ENABLE):
+        words = {place: word for place in WEIGHTS if (word := word_of(pdu, place)) is not None}
+        is_other = any(word != self._weights.get(place, 0.0) for place, word in words.items())
+        self._weights |= words
+        if writer != self._writer or (control is not None and not control & ENABLE) or is_other:
             self._writer, self._held = writer, NOTHING
         if any(
             word_of(pdu, place) not in (None, word) for place, word in zip((BAND, BAND_TIME), self._band, strict=True)

@@ -28,4 +28,16 @@ KEPT: list[tuple[int, list[Event]]] = [
             Event(1.0389, "worker", "take", (24.76,)),
         ],
     ),
+    (  # three kilograms are told while no force comes, and miss the target the other way
+        280962,
+        [
+            Event(2.9743, "worker", "take", (45.01,)),
+            Event(4.4417, "world", "cell-frozen", (1.0,)),
+            Event(6.4752, "world", "no-air", (1.0,)),
+            Event(10.532, "worker", "reset"),
+            Event(12.5522, "world", "cell-frozen", (0.0,)),
+            Event(13.5201, "worker", "take", (5.27,)),
+            Event(15.24, "worker", "ask", (1,), b"\x06\x00\t\x0b\xb8"),
+        ],
+    ),
 ]
