@@ -93,13 +93,22 @@ class MemoryKills:
 
     def __init__(self, count: Callable[[], int], clock: Callable[[], float] = time.monotonic) -> None:
         self._count, self._clock = count, clock
-        self._known, self._last_s = count(), -inf
+        self._known, self._looked_s, self._last_s = count(), clock(), -inf
+
+    def look(self) -> None:
+        """Count now and then, that one of an hour ago is not taken for the reason of a death; to be called often."""
+        if self._clock() - self._looked_s >= _ONE_SHORTAGE_S:
+            self._read()
 
     def have_just_happened(self) -> bool:
         """Asked at each death: those of one shortage come one after the other."""
+        self._read()
+        return self._looked_s - self._last_s <= _ONE_SHORTAGE_S
+
+    def _read(self) -> None:
+        self._looked_s = self._clock()
         if (now := self._count()) != self._known:
-            self._known, self._last_s = now, self._clock()
-        return self._clock() - self._last_s <= _ONE_SHORTAGE_S
+            self._known, self._last_s = now, self._looked_s
 
 
 def count_memory_kills() -> int:

@@ -10,6 +10,7 @@ from math import inf
 from typing import Any, Final
 
 from gateway.processes.event_log import EventLog
+from gateway.service.supervisor.child_process import memory_kills
 from gateway.service.supervisor.child_starter import ChildStarter
 from gateway.service.supervisor.optional_child import OptionalChildSupervisor
 from gateway.service.supervisor.simulated_rig_child import Answer, RigSupervisor
@@ -56,6 +57,7 @@ class OtherChildren:
 
     def poll_children(self, readable: set[int], now_s: float) -> None:
         """Let each look after its process; to be called after each wait."""
+        memory_kills.look()
         for one in self._watched:
             one.poll_child(readable, now_s)
 

@@ -257,6 +257,25 @@ def test_who_is_killed_while_the_kernel_kills_for_want_of_memory_is_told_with_th
     assert describe_exit(-9) == "SIGKILL"
 
 
+def test_what_the_kernel_killed_an_hour_ago_is_no_reason_of_a_kill_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    killed, now_s, reads = [3], [100.0], [0]
+
+    def count() -> int:
+        reads[0] += 1
+        return killed[0]
+
+    kills = MemoryKills(count, lambda: now_s[0])
+    monkeypatch.setattr(child_process, "memory_kills", kills)
+    killed[0] = 4
+    for _ in range(1000):
+        now_s[0] += 0.1
+        kills.look()
+    assert reads[0] <= 11, "often called, it reads now and then"
+    assert describe_exit(-9) == "SIGKILL"
+    killed[0] = 5
+    assert "memory" in describe_exit(-9)
+
+
 def test_the_kernel_s_count_of_those_is_read_and_0_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Path, "read_text", lambda _path: "nr_free_pages 7\noom_kill 12\noom_kill_other 3\n")
     assert count_memory_kills() == 12

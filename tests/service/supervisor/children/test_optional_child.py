@@ -4,11 +4,14 @@ with growing pauses, given up in time, and never makes the guardian fail."""
 import os
 from dataclasses import dataclass, field
 from math import inf
+from types import SimpleNamespace
 
 import pytest
 
+from gateway.service.supervisor import other_children
 from gateway.service.supervisor.child_process import LOST
 from gateway.service.supervisor.optional_child import OptionalChildSupervisor
+from gateway.service.supervisor.other_children import OtherChildren
 from gateway.service.supervisor.restart_policy import HELPER_PAUSES_S
 
 
@@ -127,3 +130,14 @@ def test_a_child_that_nobody_could_ask_is_said_to_have_no_exit_code(supervisor, 
     starter.children[0].code = LOST
     dies(supervisor, 1.0)
     assert "(no exit code)" in starter.said[0]
+
+
+def test_behind_each_wait_it_is_counted_whom_the_kernel_has_killed(monkeypatch):
+    """Else a kill by hand would be told with the shortage of an hour ago as its reason."""
+    looks = []
+    monkeypatch.setattr(other_children, "memory_kills", SimpleNamespace(look=lambda: looks.append(1)))
+    starter = SimpleNamespace(sources=[], due_s=inf, poll_child=lambda readable, now_s: None)
+    children = OtherChildren(starter, lambda cause, sentence: None, lambda answer: None)
+    for now_s in (1.0, 2.0):
+        children.poll_children(set(), now_s)
+    assert len(looks) == 2
