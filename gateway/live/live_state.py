@@ -5,7 +5,7 @@ here are the contract. None or an empty text stands where there is nothing to sa
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Self
 
 
@@ -183,15 +183,22 @@ class LiveState:
 
     @classmethod
     def from_json(cls, answer: Mapping[str, Any]) -> Self:
-        """Return the state that an answer carries; KeyError or TypeError for what is none."""
-        fields = {name: value for name, value in answer.items() if name != "ok"}
+        """Return the state that an answer carries; TypeError for what is none. Behind an update the gateway that still runs is
+        of another version than who asks: what it tells beside the fields of here is left out, and what it lacks is as unsaid."""
+        given = _known_fields(cls, answer)
         for name, kind in _PARTS.items():
-            fields[name] = kind(**fields[name])
+            given[name] = kind(**_known_fields(kind, given.get(name, {})))
         for name, kind in _LISTS.items():
-            fields[name] = tuple(kind(**one) for one in fields[name])
-        fields["status"] = tuple(fields["status"])
-        fields["writers"] = {name: LiveWriter(**one) for name, one in fields["writers"].items()}
-        return cls(**fields)
+            given[name] = tuple(kind(**_known_fields(kind, one)) for one in given.get(name, ()))
+        given["status"] = tuple(given.get("status", ()))
+        writers = given.get("writers", {})
+        given["writers"] = {name: LiveWriter(**_known_fields(LiveWriter, one)) for name, one in writers.items()}
+        return cls(**given)
+
+
+def _known_fields(kind: type, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the values for which a kind of state has a field."""
+    return {one.name: values[one.name] for one in fields(kind) if one.name in values}
 
 
 _PARTS: dict[str, type] = {

@@ -128,7 +128,8 @@ class GatewayClient:
                 raise
         name = f"{self.register_map.name} (map_hash 0x{self.register_map.map_hash:08X})"
         raise CliError(
-            f"E186 {self.where} serves another register map than {name}: --map FILE names the one of its rig"
+            f"E186 {self.where} serves another register map than {name}: --map FILE names the one of its rig; "
+            "one that runs since before an update has to be restarted"
         )
 
     def frames(self, assignments: Sequence[Assignment]) -> list[Frame]:
