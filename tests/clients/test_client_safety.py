@@ -104,17 +104,20 @@ def test_an_answer_to_another_question_is_a_loss(language: str, place: int, gate
     assert "lost" in client.text
 
 
+@pytest.mark.parametrize("more", [-2, 80])
 @pytest.mark.parametrize("language", OWN_SOCKETS)
-def test_an_answer_of_another_length_is_a_loss(language: str, gateway: GatewayAtHand) -> None:
-    """Whole by its header, and one register short: the words behind it would be those of the answer before."""
+def test_an_answer_of_another_length_is_a_loss(language: str, more: int, gateway: GatewayAtHand) -> None:
+    """Whole by its header, and one register short: the words behind it would be those of the answer before. A robot's list has
+    no place for what is longer: its program would stop."""
     client = CONTROLLERS[language](TEXTS[language], gateway)
     cycles(client)
     assert not client.text
     ask = gateway.ask
 
     def cut(frame: bytes) -> bytes:
-        answer = bytearray(ask(frame)[:-2])
-        answer[5], answer[8] = answer[5] - 2, answer[8] - 2
+        whole = ask(frame)
+        answer = bytearray((whole + bytes(max(more, 0)))[: len(whole) + more])
+        answer[5], answer[8] = answer[5] + more, answer[8] + more
         return bytes(answer)
 
     gateway.ask = cut  # type: ignore[method-assign]
