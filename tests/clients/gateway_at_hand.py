@@ -33,7 +33,8 @@ class Unplugged(Exception):  # noqa: N818
 
 
 class GatewayAtHand:
-    """requests: every PDU that was asked, exceptions: what was refused, as (function, code)."""
+    """requests: every PDU that was asked, exceptions: what was refused, as (function, code); asked_at: addresses and ports at
+    which a client looked for it."""
 
     def __init__(
         self, register_map: RegisterMap, *, wants_echo: bool = False, units: tuple[int, ...] = (0, 1, 255)
@@ -46,6 +47,7 @@ class GatewayAtHand:
         self.bank.on_asked = self.decide
         self.bank.staging.on_commit = self.commit
         self.requests: list[bytes] = []
+        self.asked_at: set[tuple[str, int]] = set()
         self.exceptions: list[tuple[int, int]] = []
         self.is_cut = self.is_testing = False
         self.fault = FaultCode.NONE

@@ -30,6 +30,15 @@ def test_a_reset_ends_the_enable_before_it(client: Any, gateway: GatewayAtHand) 
     assert not gateway.bank.command.control_word & 1 and not client.enabled
 
 
+@pytest.mark.parametrize("counts", [29, 435])
+def test_a_force_is_the_nearest_count(client: Any, gateway: GatewayAtHand, counts: int) -> None:
+    """0.29 and 4.35 times 100 are a little less than 29 and 435: cut, a count would be missing."""
+    client.enable(counts / 100.0)
+    cycles(client)
+    assert int(counts / 100.0 * 100.0) == counts - 1
+    assert commands(gateway) == [command(1, counts)]
+
+
 def test_a_force_below_0_is_not_sent(client: Any, gateway: GatewayAtHand) -> None:
     client.enable(12.0)
     cycles(client)
@@ -62,6 +71,18 @@ def test_a_force_is_held_on_when_the_numbers_of_its_requests_have_gone_round(
     assert client.enabled and not client.ended and commands(gateway) == [command(1, 1200)]
 
 
+@pytest.mark.parametrize("language", COUNTERS)
+def test_a_heartbeat_that_leaves_out_the_last_number_goes_round(language: str, gateway: GatewayAtHand) -> None:
+    """65535 stands in the gateway: what follows 65534 is 0, for no word holds 65536."""
+    client = CONTROLLERS[language](TEXTS[language], gateway)
+    gateway.answer(b"\x06\0\4\xff\xff")  # FC06 of the heartbeat, by an earlier program at this address
+    cycles(client)
+    COUNTERS[language](client, 0xFFFE)
+    client.enable(12.0)
+    cycles(client)
+    assert client.enabled and gateway.beats[:3] == [0xFFFF, 0, 1]
+
+
 @pytest.mark.parametrize(
     "place", [pytest.param(1, id="transaction"), pytest.param(2, id="protocol"), pytest.param(6, id="unit")]
 )
@@ -83,17 +104,20 @@ def test_an_answer_to_another_question_is_a_loss(language: str, place: int, gate
     assert "lost" in client.text
 
 
+@pytest.mark.parametrize("more", [-2, 80])
 @pytest.mark.parametrize("language", OWN_SOCKETS)
-def test_an_answer_of_another_length_is_a_loss(language: str, gateway: GatewayAtHand) -> None:
-    """Whole by its header, and one register short: the words behind it would be those of the answer before."""
+def test_an_answer_of_another_length_is_a_loss(language: str, more: int, gateway: GatewayAtHand) -> None:
+    """Whole by its header, and one register short: the words behind it would be those of the answer before. A robot's list has
+    no place for what is longer: its program would stop."""
     client = CONTROLLERS[language](TEXTS[language], gateway)
     cycles(client)
     assert not client.text
     ask = gateway.ask
 
     def cut(frame: bytes) -> bytes:
-        answer = bytearray(ask(frame)[:-2])
-        answer[5], answer[8] = answer[5] - 2, answer[8] - 2
+        whole = ask(frame)
+        answer = bytearray((whole + bytes(max(more, 0)))[: len(whole) + more])
+        answer[5], answer[8] = answer[5] + more, answer[8] + more
         return bytes(answer)
 
     gateway.ask = cut  # type: ignore[method-assign]
@@ -153,6 +177,7 @@ def test_a_robot_that_stops_its_timer_over_a_connection_that_is_dead_lets_go_ove
 def test_a_robot_that_could_not_let_go_does_so_when_its_timer_starts_again(stops: bool, gateway: GatewayAtHand) -> None:
     """Behind a loss; or a main routine that begins again, and starts the timer while the force is on."""
     client = Irc5(TEXTS["rapid"], gateway)
+    client.machine.start("FgTimerStart")
     client.enable(12.0)
     cycles(client)
     if stops:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from ipaddress import ip_address
 from itertools import pairwise
 from typing import Any
 
@@ -210,6 +211,13 @@ def test_a_robot_waits_longer_before_each_attempt(gateway: GatewayAtHand) -> Non
     assert waits == [0.25, 0.5, 1.0, 2.0, 4.0, 4.0, 4.0]
 
 
+def test_a_robot_s_thread_pauses_between_cycles_and_longer_behind_each_loss(gateway: GatewayAtHand) -> None:
+    client = UniversalRobot(TEXTS["urscript"], gateway)
+    assert client.serve(3) == [0.04, 0.04, 0.04]
+    gateway.is_cut = True
+    assert client.serve(4) == pytest.approx([0.29, 0.54, 1.04, 2.04])
+
+
 def test_words_are_signed_and_unavailable_values_are_told_from_numbers(gateway: GatewayAtHand) -> None:
     gateway.bank.publish(Status(force_measured_n=-1.25, trim_v=math.nan))
     gateway.answer(struct.pack(">BHH", 3, 5000, 1))  # refused, without a value: not a number
@@ -229,6 +237,19 @@ def test_words_are_signed_and_unavailable_values_are_told_from_numbers(gateway: 
         cycles(plc, 2)
         assert plc.output("status")["REFUSAL_VALUE"] == 65.0
         plc.disable()
+
+
+def test_who_owns_the_setpoint_is_told_by_the_four_numbers_of_its_address(gateway: GatewayAtHand) -> None:
+    gateway.take_over_from_elsewhere()
+    for plc in (S7(TEXTS["scl"], gateway), Codesys(TEXTS["st"], gateway)):
+        plc.cycle()
+        assert plc.output("status")["OWNER_IP"] == int(ip_address("10.0.0.7"))
+    irc5 = Irc5(TEXTS["rapid"], gateway)
+    irc5.cycle()
+    assert irc5.get("fgStatus")[irc5.get("FG_S_OWNER_IP") - 1 :][:2] == [10 << 8, 7]
+    python = CONTROLLERS["python"](TEXTS["python"], gateway)
+    python.cycle()
+    assert python.client.status["owner_ip"] == int(ip_address("10.0.0.7"))
 
 
 def test_a_pull_goes_out_with_enable_only_and_ends_with_it(client: Any, gateway: GatewayAtHand) -> None:

@@ -26,11 +26,11 @@ from tests.clients.texts.test_controller_rules import own_map
 
 
 def ramp_above(gateway: GatewayAtHand, force_n: float) -> None:
-    """Let each force above this one be on its way for ever, instead of in band at once."""
+    """Let each force above this one, and each pull, be on its way for ever, instead of in band at once."""
 
     def obey(command: Command) -> None:
         held = StatusBit.ENABLED | StatusBit.READY
-        if command.force_setpoint_n <= force_n:
+        if command.force_setpoint_n <= force_n and ControlBit.VALVE_PULL not in command.control_word:
             held |= StatusBit.IN_BAND
         is_on = ControlBit.ENABLE in command.control_word
         gateway.bank.publish(
@@ -51,9 +51,10 @@ def in_band(client: Any) -> bool:
     return bool(client.get("fg_in_band") if isinstance(client, UniversalRobot) else client.in_band)
 
 
-def ask_for(client: Any, force_n: float) -> None:
+def ask_for(client: Any, force_n: float, *, pulls: bool = False) -> None:
     """Ask for a new force as the head of the client's text says."""
     client.force(force_n)
+    client.pull(pulls=pulls)
     if isinstance(client, Irc5):
         client.set(fgInBand=False)
 
@@ -95,9 +96,11 @@ def test_an_enable_is_not_in_band_because_the_one_before_was(client: Any, gatewa
     assert not any(seen_in_band(client)) and gateway.bank.command.force_setpoint_n == 30.0
 
 
+@pytest.mark.parametrize("pulls", [False, True])
 @pytest.mark.parametrize("language", ["rapid", "urscript"])
-def test_a_new_force_beside_an_exchange_is_not_in_band_because_the_old_one_was(language: str) -> None:
+def test_a_force_or_pull_beside_an_exchange_is_not_in_band_because_the_last_one_was(language: str, pulls: bool) -> None:
     """Whatever the other task is doing at that moment."""
+    force_n = 12.0 if pulls else 30.0
     seen: list[bool] = []
 
     def prepare(client: Any, gateway: GatewayAtHand) -> None:
@@ -105,9 +108,10 @@ def test_a_new_force_beside_an_exchange_is_not_in_band_because_the_old_one_was(l
         client.enable(12.0)
         cycles(client, 2)
 
-    acts = [lambda client: ask_for(client, 30.0), *[lambda client: seen.append(in_band(client))] * 400]
+    acts = [lambda client: ask_for(client, force_n, pulls=pulls), *[lambda client: seen.append(in_band(client))] * 400]
     for client, gateway in every_place(language, prepare, acts):
-        assert not in_band(client) and gateway.bank.command.force_setpoint_n == 30.0
+        assert not in_band(client) and gateway.bank.command.force_setpoint_n == force_n
+        assert (ControlBit.VALVE_PULL in gateway.bank.command.control_word) is pulls
     assert len(seen) > 400 and not any(seen)
 
 

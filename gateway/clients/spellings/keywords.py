@@ -9,12 +9,14 @@ from gateway.clients.exchange import STATUS_BITS, ExchangeTable
 
 _LONGEST: Final = {"rapid": 32}  # of an identifier, with what the client sets before a name
 _KEYWORDS: Final = {
-    "st": "abs action and any array at bool by byte case configuration constant date dint do dt dword else "
-    "elsif end exit false for from function goto if int interface lint lreal lword method mod not of on "
-    "or pointer private program property protected public real reference repeat resource retain return "
-    "sint step string struct super task then this time tod transition true type udint uint ulint union "
-    "until usint var while with word xor",
-    "scl": "and any array at begin bool by byte case char continue date dint div do dt dword else elsif exit "
+    "st": "abs acos action add adr and andn any array asin at atan bitadr bool by byte cal calc calcn case "
+    "configuration constant continue cos date dint div do dt dword else elsif end eq exit exp expt false for "
+    "from function ge goto gt if indexof int interface jmp jmpc jmpcn ld le limit lint ln log lreal lt ltime "
+    "lword max method min mod move mul mux ne not of on or orn params persistent pointer private program "
+    "property protected public r real reference repeat resource ret retain retc retcn return rol ror s sel shl "
+    "shr sin sint sizeof sqrt st step stn string struct sub super tan task then this time to tod transition true "
+    "trunc type udint uint ulint union until usint var while with word wstring xor xorn",
+    "scl": "and any array at begin bool by byte case char continue counter date dint div do dt dword else elsif exit "
     "false for function goto if int label lint lreal mod nil not of or pointer program real region repeat "
     "return sint string struct then time timer to tod true type udint uint ulint until usint var variant "
     "version void while with word xor",
@@ -23,7 +25,8 @@ _KEYWORDS: Final = {
     "register restrict return short signed sizeof static struct switch template this throw try typedef "
     "typename union unsigned using virtual void volatile while",
 }
-"""Of Structured Text and SCL, whose structures have the registers as members; of C with those of C++."""
+"""Of Structured Text (with its operators and those of instruction lists, which TwinCAT and CODESYS reserve) and SCL, whose
+structures have the registers as members; of C with those of C++."""
 _CONSTANT: Final = {
     "rapid": re.compile(r"^  (?:LOCAL )?CONST \w+ (FG_\w+)", re.M),
     "urscript": re.compile(r"^global (FG_\w+) =", re.M),

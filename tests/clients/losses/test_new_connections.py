@@ -13,8 +13,9 @@ from tests.clients.losses.test_edges_and_losses import OF_A_PROGRAM
 from tests.clients.programs.c_program import OK, CProgram
 from tests.clients.programs.controllers.irc5 import Irc5
 from tests.clients.programs.controllers.plc import Plc
-from tests.clients.programs.controllers.structured_text import Codesys
+from tests.clients.programs.controllers.structured_text import Codesys, TwinCat
 from tests.clients.programs.controllers.universal_robot import UniversalRobot
+from tests.clients.programs.iec_libraries import ClientTcp, TwinCatRequest
 from tests.clients.scenes import TEXTS, command, commands, cycles
 
 RAMP = 2
@@ -137,3 +138,47 @@ def test_a_codesys_controller_leaves_a_connection_on_which_nobody_answers(gatewa
     client.enable(5.0)
     cycles(client)
     assert client.enabled
+
+
+def test_a_codesys_controller_waits_for_no_connection_without_an_end(
+    gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To an address where nothing answers ClientTCP may connect for as long as TCP tries; the enable of before that time would
+    press when the gateway is switched on."""
+    monkeypatch.setattr(ClientTcp, "open", lambda self: None)
+    client = Codesys(TEXTS["codesys"], gateway)
+    client.enable(12.0)
+    client.cycle(0.8)
+    assert client.ended and "lost" in client.text
+    monkeypatch.undo()
+    client.cycle(8.0)
+    assert gateway.requests and gateway.writes == [] and not client.enabled
+
+
+@pytest.mark.parametrize("number", [1861, 0x8007274C])
+def test_a_twincat_controller_takes_no_number_of_ads_or_windows_for_a_refusal(
+    number: int, gateway: GatewayAtHand, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of a connection that timed out, say (10060 in Winsock): a status that is read behind it has another request's reason."""
+    monkeypatch.setattr(TwinCatRequest, "NO_ANSWER", number)
+    client = TwinCat(TEXTS["twincat"], gateway)
+    client.enable(12.0)
+    cycles(client)
+    lost = lose_one(gateway)
+    client.force(13.0)
+    cycles(client, 2)
+    assert lost and client.ended and "lost" in client.text
+
+
+def test_a_robot_says_whether_its_connection_was_closed_or_nobody_answered(gateway: GatewayAtHand) -> None:
+    """The one is the gateway's doing (its allow-list, its limits, an end of its program), the other a cable's."""
+    client = Irc5(TEXTS["rapid"], gateway)
+    cycles(client)
+    client.is_open = False
+    client.cycle()
+    assert client.text == "lost: connection closed"
+    client.cycle(4.0)
+    assert client.get("fgConnected")
+    gateway.is_cut = True
+    client.cycle()
+    assert client.text == "lost: no answer in time"

@@ -114,3 +114,21 @@ def test_who_enables_anew_has_ended_no_more(program: CProgram, gateway: GatewayA
     assert not program.ended
     cycles(program)
     assert program.enabled and not program.ended
+
+
+def test_a_machine_that_is_off_holds_the_program_for_no_longer_than_its_timeout(
+    program: CProgram, gateway: GatewayAtHand
+) -> None:
+    """A socket that waits would hold it for the two minutes that TCP tries, and the heartbeats to others beside it."""
+    gateway.is_cut = program.is_silent = True
+    program.cycle(0.0)
+    assert program.now_s == 0.5 and "not accepted in time" in program.text
+
+
+def test_a_signal_that_comes_while_it_waits_costs_no_force(program: CProgram, gateway: GatewayAtHand) -> None:
+    """A timer of the program, say: poll ends with EINTR, and what was waited for is still to come."""
+    program.enable(12.0)
+    cycles(program)
+    program.send_signals(3)
+    program.cycle()
+    assert program.enabled and not program.ended and not program.text

@@ -11,6 +11,7 @@
 #define clock_gettime at_hand_clock
 #define FORCE_GATEWAY_IMPLEMENTATION
 #include "force_gateway.h"
+#include <stdarg.h>
 #include <stdlib.h>
 
 typedef int (*answer_function)(const uint8_t *frame, int count, uint8_t *answer);
@@ -20,16 +21,38 @@ static accept_function accepts;
 static long long clock_ms;
 static uint8_t waiting[600];
 static int first, end;
+static int blocks, connects; /* the socket waits; its connection is still to come */
+static int signals; /* that come while the program waits */
 
-int at_hand_socket(int family, int type, int protocol) { (void)family; (void)type; (void)protocol; first = end = 0; return 1000; }
-int at_hand_connect(int s, const struct sockaddr *to, socklen_t n) { (void)s; (void)to; (void)n; errno = ECONNREFUSED; return accepts() ? 0 : -1; }
+int at_hand_socket(int family, int type, int protocol) { (void)family; (void)type; (void)protocol; first = end = connects = 0; blocks = 1; return 1000; }
+int at_hand_connect(int s, const struct sockaddr *to, socklen_t n) {
+    const int answer = accepts(); /* 0 refuses, 1 accepts, 2 is silent */
+    (void)s; (void)to; (void)n;
+    if (answer == 1) return 0;
+    connects = answer == 2 && !blocks;
+    if (answer == 2 && blocks) clock_ms += 130000; /* as long as TCP tries */
+    errno = connects ? EINPROGRESS : answer ? ETIMEDOUT : ECONNREFUSED;
+    return -1;
+}
 int at_hand_close(int s) { (void)s; return 0; }
-int at_hand_fcntl(int s, int what, ...) { (void)s; (void)what; return 0; }
+int at_hand_fcntl(int s, int what, ...) {
+    va_list given;
+    (void)s;
+    va_start(given, what);
+    if (what == F_SETFL && va_arg(given, int) & O_NONBLOCK) blocks = 0;
+    va_end(given);
+    return 0;
+}
 int at_hand_setsockopt(int s, int l, int o, const void *v, socklen_t n) { (void)s; (void)l; (void)o; (void)v; (void)n; return 0; }
 int at_hand_getsockopt(int s, int l, int o, void *v, socklen_t *n) { (void)s; (void)l; (void)o; (void)v; (void)n; return 0; }
 int at_hand_poll(struct pollfd *waited, nfds_t count, int ms) {
     (void)count;
-    if (waited->events & POLLOUT || first < end || end < 0) return 1;
+    if (signals > 0) {
+        signals--;
+        errno = EINTR;
+        return -1;
+    }
+    if ((waited->events & POLLOUT && !connects) || first < end || end < 0) return 1;
     clock_ms += ms;
     return 0;
 }
@@ -55,6 +78,7 @@ int at_hand_clock(clockid_t which, struct timespec *now) {
 }
 void use(answer_function answer, accept_function accept, long long now_ms) { answer_of = answer; accepts = accept; clock_ms = now_ms; }
 long long time_ms(void) { return clock_ms; }
+void send_signals(int count) { signals = count; }
 fg_client *make(int unit) {
     fg_client *client = malloc(sizeof *client);
     fg_init(client, "127.0.0.1", 502, (uint8_t)unit);

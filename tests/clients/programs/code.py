@@ -231,8 +231,8 @@ class Writer:
         self.body(node[1])
 
     def write_critical(self, node: Node) -> None:
-        """URScript: no other thread runs in here."""
-        self.line(f"machine.is_critical = {node[1]}")
+        """URScript: no other thread runs in here. One that is left open stops the robot's other threads for ever."""
+        self.line(f"assert machine.is_critical != {node[1]}; machine.is_critical = {node[1]}")
 
     def write_assign(self, node: Node) -> None:
         found, scope = self.new(), node[3] if len(node) > 3 else ""

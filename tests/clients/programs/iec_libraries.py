@@ -50,6 +50,7 @@ class TwinCatRequest:
 
     def finish(self, given: dict[str, Any]) -> None:
         self.bBusy = False
+        self.gateway.asked_at.add((given["sIPAddr"], given["nTCPPort"]))
         write, read, target = self.asked(given)
         try:
             pdu = self.gateway.ask_unit(given["nUnitID"], pdu_of(write, read))
@@ -105,6 +106,7 @@ class ClientTcp:
 
     def call(self, given: dict[str, Any]) -> None:
         assert len(given["aIPaddr"]) == 4
+        self.gateway.asked_at.add((".".join(map(str, given["aIPaddr"])), given["uiPort"]))
         rises, self.asked = given["xConnect"] and not self.asked, given["xConnect"]
         if not self.asked:
             self.xConnected = self.xError = False

@@ -44,6 +44,7 @@ class PythonProgram:
         self.now_s += seconds
 
     def _connect(self, address: tuple[str, int], timeout_s: float) -> SocketAtHand:
+        self.gateway.asked_at.add(address)
         try:
             self.gateway.connect()
         except Unplugged:

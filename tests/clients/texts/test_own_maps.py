@@ -78,6 +78,9 @@ def test_a_map_without_the_names_that_a_client_says_is_told_so(
     ("name", "languages"),
     [
         ("type", {"scl", "st"}),
+        ("counter", {"scl"}),  # a type of its own
+        ("limit", {"st"}),  # an operator
+        ("st", {"st"}),  # and one of an instruction list
         ("default", {"c"}),
         ("force_of_the_left_hand_cells", {"rapid"}),  # FG_S_ and 28 characters
         ("force_of_the_left_hand_cell", set[str]()),

@@ -51,6 +51,16 @@ def test_an_upload_is_staged_committed_and_awaited(client: Any, gateway: Gateway
     assert client.enabled, "the heartbeat went on meanwhile"
 
 
+def test_a_robot_that_sums_a_part_leaves_time_to_its_motion(gateway: GatewayAtHand) -> None:
+    """16 bits take it some hundred statements: a thread that never waits among 70 words holds up the others."""
+    robot = UniversalRobot(TEXTS["urscript"], gateway)
+    cycles(robot)
+    assert robot.syncs == 0, "a cycle without an upload is done in one frame"
+    robot.begin_upload(MODEL, 3)
+    robot.cycle()
+    assert len(gateway.uploads) == 1 and robot.syncs >= 70 // 8
+
+
 @pytest.mark.sampled
 def test_an_upload_that_fails_says_why(client: Any, gateway: GatewayAtHand) -> None:
     client.begin_upload(MODEL | {"rising_b": [0.0, 70.0, 60.0]}, 0)

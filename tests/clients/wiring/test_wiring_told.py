@@ -111,6 +111,17 @@ def test_a_lease_that_is_short_for_a_robot_is_told(lease_s: float, is_short: boo
     assert ("set lease_s to 0.12 or more" in told) is is_short and f"{rate} or more for the heartbeat" in told
 
 
+@pytest.mark.parametrize(("units", "slave"), [("[0, 1, 255]", 255), ("[1, 7]", 1), ("[7]", 7)])
+def test_who_sets_a_robot_s_own_modbus_client_is_told_an_address_that_this_rig_answers(
+    units: str, slave: int, tmp_path: Path
+) -> None:
+    text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text()
+    (tmp_path / "own.yaml").write_text(text.replace("units: [0, 1, 255]", f"units: {units}"))
+    page = page_of(tmp_path / "own.yaml")
+    (told,) = [" ".join(one["sentences"]) for one in page["sections"] if one["title"] == "Universal Robots"]
+    assert f"slave address {slave}," in told and ("does not answer 255" in told) is (slave != 255)
+
+
 def test_of_eight_outputs_the_one_that_is_driven_is_named(tmp_path: Path) -> None:
     text = (PROFILES / "rigs" / "irc5-cell.yaml").read_text().replace("device: smc-itv-rc", "device: waveshare-ao8b")
     (tmp_path / "own.yaml").write_text(text)
@@ -236,6 +247,20 @@ def test_the_requests_of_an_s7_and_the_lines_to_try_have_the_function_and_the_ad
         ["mbpoll -1 -p 5020 -t 4:float -B -r 237 192.168.125.20", "force_measured in N, float_abcd"],
         ["mbpoll -1 -p 5020 -t 4:float -r 337 192.168.125.20", "force_measured in N, float_cdab"],
     ]
+    assert lines[-1] == "mbpoll -1 -p 5020 -r 1 192.168.125.20 0    # disable: safe voltage"
+    (lines,) = [section["commands"] for section in page_of("demo")["sections"] if section["title"].startswith("mbpoll")]
+    assert lines[-2:] == [
+        "mbpoll -1 -p 5020 -r 1 127.0.0.1 1 1200    # enable, 12.00 N, and it lasts",
+        "mbpoll -1 -p 5020 -r 1 127.0.0.1 0    # disable: safe voltage",
+    ]
+
+
+def test_an_electrician_connects_the_pins_of_an_adapter_as_tia_574_numbers_them() -> None:
+    """On an adapter's plug of nine pins 2 is what it hears, 3 what it says, and 5 the ground; a valve is on two wires."""
+    line = rows_of(page_of("irc5-cell"), "Serial line: output")
+    assert line["interface"] == ["RS-232"]
+    assert "2 RxD <- the device's TxD, 3 TxD -> the device's RxD, 5 GND - GND" in line["wires"][0]
+    assert rows_of(page_of("paper-pull"), "Serial line: valve")["interface"] == ["RS-485, two wires"]
 
 
 @pytest.mark.parametrize(("port", "is_taken"), [(502, True), (5020, True), (102, False), (5001, False), (49152, False)])

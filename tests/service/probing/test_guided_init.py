@@ -14,6 +14,7 @@ from gateway.cli.setup.starter_rig import starter_rig
 from gateway.devices import DeviceProfile
 from gateway.devices.messages import SetVoltage
 from gateway.profiles import check_report, load_device
+from gateway.profiles.rigs.checks.wire_times import wire_cycle_s
 from tests.service.probing.far_ends import FarEnd, behind_ptys
 
 
@@ -44,6 +45,33 @@ def test_the_devices_say_what_they_are_and_the_file_is_accepted(folder: Path) ->
     assert not found.rig.accept_no_device_watchdog
     assert not any(isinstance(one, SetVoltage) for one in module.heard)
     assert sorted(path.name for path in folder.iterdir()) == ["own.yaml"]
+
+
+def test_enter_takes_the_speed_at_which_the_device_was_found() -> None:
+    """Its profile names the one of its factory: in the file the device would be silent at the first start."""
+    with behind_ptys(FarEnd(load_device("stream-st-gs"), baud=38400)) as (cell,):
+        result = answered("later", "smc-itv-rc", "", "y", cell, "y", "", "", "98.07", "40")
+    assert "stream-st-gs answers at 38400 8N1" in result.output
+    rig = check_report("own.yaml", simulated=True).rig
+    assert rig and (rig.load_cell.device.name, rig.load_cell.baud) == ("stream-st-gs", 38400)
+
+
+@pytest.mark.parametrize("helps", [True, False])
+def test_an_output_without_a_watchdog_is_to_be_looked_at_again_where_nothing_else_helps(helps: bool) -> None:
+    answered("later", "smc-itv-rc", "", "y" if helps else "n", "later", "", "", "98.07", "40")
+    (line,) = [one for one in Path("own.yaml").read_text().splitlines() if one.startswith("accept_no_device_watchdog")]
+    assert line.startswith("accept_no_device_watchdog: true") and ("EDIT: nothing else helps" in line) is not helps
+
+
+@pytest.mark.parametrize("baud", [4800, 9600])
+def test_a_slow_output_may_lose_an_answer_within_its_bound(baud: int) -> None:
+    """A bound of one exchange, and the first character that is lost ends the force: check warns of it."""
+    answered("later", "smc-itv-rc", str(baud), "y", "later", "", "", "98.07", "40")
+    found = check_report("own.yaml", simulated=True)
+    assert found.rig, [str(fault) for fault in found.faults]
+    assert not [one for one in found.warnings if "output_timeout_s" in f"{one.path} {one.message}"]
+    line = found.rig.output
+    assert found.rig.control.supervision.output_timeout_s >= 3 * wire_cycle_s(line.device, line.settings)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from gateway.cli.setup.port_probing import tell_report
+from gateway.cli.setup.port_probing import probe_path, tell_report
 from gateway.devices import DeviceProfile, ValveDevice, ValveDirection, cell_device, output_device
 from gateway.devices.binary.register_access import RegisterAccess
 from gateway.devices.binary.rtu_framing import rtu_frame
@@ -49,6 +49,26 @@ class Refusing(FarEnd):
     def __init__(self, profile: DeviceProfile, answer: bytes) -> None:
         super().__init__(profile)
         self.pty = PacedPty(profile.serial.baud, on_bytes=lambda chunk, now_s: self.pty.send(answer))
+
+
+class WaitsToBeTold(FarEnd):
+    """An amplifier that streams from its start on, and says nothing before."""
+
+    def open(self) -> None:
+        self.pty.open()
+
+    def _on_bytes(self, chunk: bytes, now_s: float) -> None:
+        if b"GO" in chunk and self._timer is None:
+            self._stream()
+
+
+@pytest.mark.parametrize("start", ["GO", "RUN"])
+def test_a_stream_that_waits_for_its_start_is_begun_in_the_words_of_its_profile_alone(start: str) -> None:
+    assert STREAM.stream
+    profile = replace(STREAM, stream=replace(STREAM.stream, start=start))
+    with behind_ptys(WaitsToBeTold(profile)) as (path,):
+        report = probe_path(path, [profile], is_speed_known=True)
+    assert bool(report.answers) is (start == "GO")
 
 
 @pytest.mark.parametrize(

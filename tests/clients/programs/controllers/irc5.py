@@ -22,6 +22,7 @@ class Irc5:
         self.now_s = 0.0
         self.counted_s: dict[str, float] = {}
         self.started_s: dict[str, float] = {}  # of clocks that run
+        self.interrupts: set[str] = set()  # that are connected to their trap
         self.sent: list[bytes] = []
         self.said: list[str] = []
         self.machine = Machine(parse(text, "rapid"), self.library())
@@ -48,7 +49,9 @@ class Irc5:
             "implicit_for": True,
             **dict.fromkeys(["UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED"]),
             **{name: name for name in ("UINT", "USINT", "ERR_SOCK_TIMEOUT", "ERR_SOCK_CLOSED", "ERR_FG_FRAME")},
-            **dict.fromkeys(["BOOKERRNO", "IDELETE", "CONNECT", "ITIMER"], nothing),
+            **dict.fromkeys(["BOOKERRNO", "ITIMER"], nothing),
+            "CONNECT": lambda machine, arguments, frame: self.connect_interrupt(arguments[0][1]),
+            "IDELETE": lambda machine, arguments, frame: self.interrupts.discard(arguments[0][1].upper()),
             "CLKSTART": lambda machine, arguments, frame: self.started_s.setdefault(arguments[0][1], self.now_s),
             "CLKSTOP": lambda machine, arguments, frame: self.stop_clock(arguments[0][1]),
             "CLKRESET": lambda machine, arguments, frame: self.reset_clock(arguments[0][1]),
@@ -91,6 +94,12 @@ class Irc5:
         self.counted_s[name] = 0.0
         self.started_s.pop(name, None)
 
+    def connect_interrupt(self, name: str) -> None:
+        """Raise what CONNECT does of an interrupt that is connected already (RAPID instructions, CONNECT)."""
+        if name.upper() in self.interrupts:
+            raise RapidError("ERR_ALRDYCNT")
+        self.interrupts.add(name.upper())
+
     def options(self, machine: Machine, arguments: list[Node], frame: Frame) -> dict[str, Any]:
         return {each[1].upper(): machine.value(each[2], frame) for each in arguments if each[0] == "named"}
 
@@ -105,6 +114,8 @@ class Irc5:
 
     def connect(self, machine: Machine, arguments: list[Node], frame: Frame) -> None:
         assert self.options(machine, arguments, frame).keys() == {"TIME"}
+        _, host, port = [each for each in arguments if each[0] != "named"]
+        self.gateway.asked_at.add((machine.value(host, frame), machine.value(port, frame)))
         try:
             self.gateway.connect()
         except Unplugged:

@@ -48,7 +48,11 @@ class MbClient:
         address, count, words = given["MB_DATA_ADDR"] - 40001, given["MB_DATA_LEN"], given["MB_DATA_PTR"]
         assert words == self.data and len(words) >= count and 0 <= address < 9999
         assert self.RCV_TIMEOUT == 0.5, "with its own 2 s the status of a gateway that is gone would look fresh"
-        assert given["CONNECT"]["CONNECTIONTYPE"] == 11 and given["CONNECT"]["ACTIVEESTABLISHED"]
+        connection = given["CONNECT"]
+        assert connection["CONNECTIONTYPE"] == 11 and connection["ACTIVEESTABLISHED"]
+        octets = connection["REMOTEADDRESS"]["ADDR"][1:]
+        self.plc.gateway.asked_at.add((".".join(map(str, octets)), connection["REMOTEPORT"]))
+        self.plc.connection = connection["INTERFACEID"], connection["ID"]
         if given["MB_MODE"] == 0:
             request = struct.pack(">BHH", 3, address, count)
         elif count == 1:
@@ -89,6 +93,7 @@ class S7(Plc):
 
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
         super().__init__(text, "scl", gateway, "ForceGateway")
+        self.connection = 0, 0  # InterfaceId and ID, as MB_CLIENT was told
 
     def prepare(self) -> None:
         connection = dict.fromkeys(("InterfaceId", "ID", "ConnectionType", "ActiveEstablished"), ("int", None))

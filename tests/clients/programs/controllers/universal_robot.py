@@ -2,6 +2,7 @@
 virtual time."""
 
 import math
+from contextlib import suppress
 from typing import Any
 
 from tests.clients.gateway_at_hand import GatewayAtHand, Unplugged
@@ -16,6 +17,8 @@ class UniversalRobot:
     def __init__(self, text: str, gateway: GatewayAtHand) -> None:
         self.gateway, self.sending, self.received = gateway, b"", b""
         self.sent: list[bytes] = []
+        self.syncs, self.waits = 0, 0
+        self.pauses: list[float] = []
         library = {
             "first_index": 0,
             "typed": True,
@@ -27,13 +30,32 @@ class UniversalRobot:
             "floor": values(math.floor),
             "str_cat": values(lambda a, b: f"{a}{b}"),  # of strings and whole numbers alike (script manual)
             "textmsg": values(lambda *words: None),
-            "sync": values(lambda: None),
-            "sleep": values(lambda seconds: None),
+            "sync": values(self.sync),
+            "sleep": values(self.sleep),
         }
         self.machine = Machine(parse(text, "urscript"), library, fold=False)
         self.machine.begin()
 
-    def open(self, _host: str, _port: int, _name: str) -> bool:
+    def serve(self, waits: int) -> list[float]:
+        """Run fg_thread until it has paused so many times; return how long each pause was."""
+        self.pauses, self.waits = [], waits
+        with suppress(StopIteration):
+            self.machine.start("fg_thread")
+        return self.pauses
+
+    def sleep(self, seconds: float) -> None:
+        assert not self.machine.is_critical, "no other thread would run while it waits"
+        self.pauses.append(seconds)
+        if len(self.pauses) == self.waits:
+            raise StopIteration
+
+    def sync(self) -> None:
+        """Use up what is left of the thread's time in this frame: the robot's motion is planned by the next."""
+        self.syncs += 1
+
+    def open(self, host: str, port: int, _name: str) -> bool:
+        assert not self.machine.is_critical, "no other thread would run while it waits"
+        self.gateway.asked_at.add((host, port))
         try:
             self.gateway.connect()
         except Unplugged:
@@ -51,6 +73,7 @@ class UniversalRobot:
 
     def read(self, count: int, _name: str, _timeout: float) -> list[int]:
         """As socket_read_byte_list: "a maximum of 30 values can be read in one command" (script manual, e-Series)."""
+        assert not self.machine.is_critical, "no other thread would run while it waits"
         if count > 30:
             return [0] + [-1] * count
         if self.sending:
