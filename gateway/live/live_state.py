@@ -184,7 +184,7 @@ class LiveState:
     @classmethod
     def from_json(cls, answer: Mapping[str, Any]) -> Self:
         """Return the state that an answer carries; TypeError for what is none. Behind an update the gateway that still runs is
-        of another version than who asks: what it tells beside the fields of here is left out, and what it lacks is as unsaid."""
+        of another version than who asks: what it tells beside the fields of here is left out, what it lacks is unsaid."""
         given = _known_fields(cls, answer)
         for name, kind in _PARTS.items():
             given[name] = kind(**_known_fields(kind, given.get(name, {})))
