@@ -6,6 +6,8 @@ takes a few milliseconds), its death is read like any other event, and a start t
 library only.
 """
 
+import contextlib
+import socket
 from collections.abc import Callable
 from math import inf
 from typing import Final
@@ -18,13 +20,16 @@ _LONG_LIFE_S: Final = 900.0  # a child that lived this long begins to count anew
 
 
 class OptionalChildSupervisor:
-    """what: the child in words; spawn: starts the process, OSError when that fails; say: a sentence for people. Times are
-    monotonic seconds."""
+    """what: the child in words; spawn: starts the process, OSError when that fails; say: a sentence for people; listen: the
+    listening socket that is kept for it. Times are monotonic seconds."""
 
-    def __init__(self, what: str, spawn: Callable[[], Child], say: Callable[[str], None]) -> None:
+    def __init__(
+        self, what: str, spawn: Callable[[], Child], say: Callable[[str], None], listen: int | None = None
+    ) -> None:
         self._what = what
         self._spawn = spawn
         self._say = say
+        self._listen = listen
         self._child: Child | None = None
         self._due_s = inf
         self._began_s = 0.0
@@ -79,7 +84,18 @@ class OptionalChildSupervisor:
         self._deaths += 1
         if self._deaths > len(HELPER_PAUSES_S):
             self._say(f"A346 {self._what} {how} {self._deaths} times: it stays off, control goes on without it")
+            if self._listen is not None:
+                _refuse_callers(self._listen)
             return
         pause_s = HELPER_PAUSES_S[self._deaths - 1]
         self._due_s = now_s + pause_s
         self._say(f"A346 {self._what} {how}: it is started again in {pause_s:g} s, control goes on")
+
+
+def _refuse_callers(listen: int) -> None:
+    """Let the kernel refuse who calls from now on, and who waits already. The descriptor stays ours: without it the next
+    control process would open another one, which nobody answers either."""
+    listener = socket.socket(fileno=listen)
+    with contextlib.suppress(OSError):  # then they wait, as before; the guardian goes on
+        listener.shutdown(socket.SHUT_RD)
+    listener.detach()

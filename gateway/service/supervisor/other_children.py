@@ -73,7 +73,9 @@ class OtherChildren:
         """Start a child that control can do without, now that control is ready. The first arguments count."""
         if name not in self._optional:
             spawn = partial(self._starter.optional, name, arguments)
-            self._optional[name] = OptionalChildSupervisor(_WORDS[name], spawn, partial(self._log, name))
+            self._optional[name] = OptionalChildSupervisor(
+                _WORDS[name], spawn, partial(self._log, name), arguments.get("listen")
+            )
             self._all.append(self._optional[name])
         self._optional[name].start(now_s)
 

@@ -2,7 +2,9 @@
 with growing pauses, given up in time, and never makes the guardian fail."""
 
 import os
+import socket
 from dataclasses import dataclass, field
+from itertools import accumulate
 from math import inf
 from types import SimpleNamespace
 
@@ -82,6 +84,28 @@ def test_a_dead_child_is_started_again_later_each_time_and_then_no_more(supervis
     assert starter.said[-1].startswith("A346 the page ended (exit 1) 4 times: it stays off")
     supervisor.start(now_s + 2.0)
     assert len(starter.children) == 4, "a restarted control does not wake it"
+
+
+def test_behind_the_last_death_who_calls_is_refused_and_who_waits_is_sent_away():
+    """A browser waited without an end: the port listened on, for nobody."""
+
+    def refuse(name, arguments):
+        raise OSError(11, "Resource temporarily unavailable")
+
+    starter = SimpleNamespace(sources=[], due_s=inf, poll_child=lambda readable, now_s: None, optional=refuse)
+    children = OtherChildren(starter, lambda cause, sentence: None, lambda answer: None)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        address = listener.getsockname()
+        children.provide_optional("web", {"listen": listener.fileno()}, 0.0)
+        waiting = socket.create_connection(address, 5.0)
+        for now_s in accumulate(HELPER_PAUSES_S):
+            socket.create_connection(address, 5.0).close()
+            children.poll_children(set(), now_s)
+        with waiting, pytest.raises(ConnectionError):
+            assert waiting.recv(1) == b"never"
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(address, 5.0)
+        assert os.fstat(listener.fileno()), "the next control process is told of it: it opens no other"
 
 
 def test_a_long_life_forgives_earlier_deaths(supervisor, starter):
