@@ -178,7 +178,7 @@ def _codesys(rig: Rig, table: ExchangeTable) -> Section:
 def _universal_robot(rig: Rig, table: ExchangeTable) -> Section:
     where, lease_s = table.where, rig.control.supervision.lease_s
     rate_hz = max(_USUAL_HZ, ceil(_BEATS_OF_A_LEASE / lease_s)) if lease_s else _USUAL_HZ
-    slave = 255 if 255 in rig.network.units else where.unit
+    slave = f"{where.unit} (255, as it comes, is answered too)" if 255 in rig.network.units else str(where.unit)
     by_script = (
         "By script (recommended: all words and reasons; PolyScope 3.8 on a CB3, 5.2 on an e-Series, or newer): a Script "
         "node in BeforeStart with the file made below, then"
