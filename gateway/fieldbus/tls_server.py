@@ -45,7 +45,7 @@ class ModbusTlsServer(ModbusTcpServer):
         soon = _utc(SOON_DAYS) if self._to_tell else ""
         for due in [each for each in self._to_tell if each[0] <= soon]:
             self._to_tell.remove(due)
-            self._log(due[1], due[1], now_s)  # each is a cause of its own
+            self._log(f"certificate {due[1]}", due[1], now_s)  # each is a cause of its own
 
     async def close(self) -> None:
         """Stop listening, cut the handshakes and end every connection."""

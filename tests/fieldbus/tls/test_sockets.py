@@ -116,13 +116,13 @@ def test_a_gateway_that_runs_for_years_tells_when_its_certificate_is_about_to_en
     ends = read_certificates(Path(certificate).read_bytes())[0].ends
     day_before = (datetime.strptime(ends, "%Y%m%d%H%M%S%z") - timedelta(days=1)).strftime("%Y%m%d%H%M%SZ")
 
-    async def main(*moments: str) -> list[str]:
+    async def main(*moments: str) -> list[tuple[str, str]]:
         """What is told at these moments, each given by what it is 30 days later."""
-        clock, log, now = HandClock(), list[str](), [moments[0]]
+        clock, log, now = HandClock(), list[tuple[str, str]](), [moments[0]]
         files = TlsSettings(ServerSettings(), certificate, folder.key("gateway"), authority)
         monkeypatch.setattr(tls_server, "_utc", lambda days=0: now[0])
         server = ModbusTlsServer(
-            NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda _, told: log.append(told), clock=clock
+            NotingBank(), files, on_peer_closed=list[Peer]().append, log=lambda *said: log.append(said), clock=clock
         )
         await server.start("127.0.0.1", 0)
         for now[0] in moments:
@@ -131,6 +131,9 @@ def test_a_gateway_that_runs_for_years_tells_when_its_certificate_is_about_to_en
         return log
 
     told = asyncio.run(main(day_before, day_before, ends))
+    assert [cause.split()[0] for cause, _ in told] == ["certificate"] * 2, "what the event is about"
     named = (("certificate", certificate), ("ca", authority))
-    assert told == [f"W246 {file} expires on {day_of(ends)}: {CURES[name]}" for name, file in named]
+    assert [said for _, said in told] == [
+        f"W246 {file} expires on {day_of(ends)}: {CURES[name]}" for name, file in named
+    ]
     assert asyncio.run(main(ends, ends)) == [], "its start has told it"
