@@ -56,3 +56,17 @@ def test_from_the_moment_on_at_which_the_gateway_stops_no_force_is_taken() -> No
     bench.controller.stop()
     refused = bench.controller.refusal_of(bench.now_s, asked, bench.line)
     assert refused and refused.reason is RefusalReason.STOPPING
+
+
+@pytest.mark.parametrize("state", [State.OFF, State.FAULT])
+def test_a_stop_that_comes_when_nothing_is_enabled_any_more_is_no_event(state: State) -> None:
+    """The bank lets it through while something presses; what has ended that before the next step is no mistake of anybody."""
+    bench = Bench()
+    bench.run(0.5)
+    if state is State.FAULT:
+        bench.enable(10.0)
+        bench.cell_silent = True
+        bench.run(0.5)
+    said = len(bench.events)
+    stopped = bench.write(control_word=ControlBit(0), stops=True)
+    assert (stopped.state, stopped.voltage_v, bench.events[said:]) == (state, 0.0, [])
