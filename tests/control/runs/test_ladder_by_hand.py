@@ -99,6 +99,26 @@ def test_a_stair_of_the_check_is_judged_by_its_rise_from_rest(
         assert (cause.fault if cause else None) == (fault if judged == stair(4.0, CHECK) else later)
 
 
+@pytest.mark.parametrize(
+    ("share", "fault"),
+    [
+        (0.0, None),
+        (0.29, None),
+        (-0.29, None),
+        (-0.31, FaultCode.SIGN_INVERTED),
+        (2.99, None),
+        (3.01, FaultCode.GAIN_WRONG),
+    ],
+)
+def test_of_a_stair_that_friction_may_hold_whole_only_a_clear_answer_is_judged(
+    share: float, fault: FaultCode | None
+) -> None:
+    volts, _ = bsfm().voltage_v(4.0, 1.0)
+    run = run_of(stair(volts, CHECK))
+    run._check_against_model(LadderRow(stair(volts, CHECK), share * 4.0, 1.0, True))
+    assert (run.stop_cause and run.stop_cause.fault) == fault
+
+
 @pytest.mark.parametrize(("expected_n", "is_judged"), [(14.9, False), (15.1, True)])
 def test_behind_the_check_a_stair_of_little_force_is_not_judged(expected_n: float, is_judged: bool) -> None:
     """A machine of much friction, which has passed the check, gives next to nothing there."""
