@@ -53,6 +53,27 @@ def test_friction_that_is_shaken_loose_does_not_pass_the_stated_force() -> None:
     assert 0.5 * sum(curve.value(levels.second_v) for curve in (rising, falling)) <= most_n
 
 
+@pytest.mark.parametrize(
+    ("rest_n", "middle_n", "has_room"),
+    [
+        (0.0, 26.2, True),
+        (14.4, 26.2, True),  # 1.6 N below what is meant to be reached
+        (14.6, 26.2, False),  # 1.4 N: less than what is friction's
+        (0.0, 50.0, True),
+        (8.0, 50.0, False),  # the first level, shaken loose whole, would pass it
+    ],
+)
+def test_there_are_levels_where_span_and_friction_leave_room_for_both(
+    rest_n: float, middle_n: float, has_room: bool
+) -> None:
+    """middle_n: of the falling branch, 26 N of the rising one."""
+    branches = (RationalBezier(0.0, 8.0, [0.0, control_n, 57.0], [1.0, 1.0, 1.0]) for control_n in (26.0, middle_n))
+    levels = Levels(known(Bsfm(Branches(*branches), LinearBlend(6.0))), FORCE_N, rest_n)
+    assert (levels.why_no_room == "") is has_room
+    kept = f"{rest_n:.1f} N at rest and a friction of {levels.friction_n(levels.first_v):.1f} N leave no room"
+    assert has_room or levels.why_no_room == f"{kept} below self_test.force_n = 20 N: raise it"
+
+
 def test_a_machine_that_presses_at_rest_by_its_calibration_is_pressed_beyond_that() -> None:
     """Right behind a tare it reads 0 there: two fifths of the way from 0 were less than it has without a volt."""
     lifted = (RationalBezier(0.0, 8.0, [8.0, *ends], [1.0, 1.0, 1.0]) for ends in ((26.0, 57.0), (34.0, 57.0)))
