@@ -90,3 +90,14 @@ def test_a_start_that_was_refused_counts_again_behind_a_heartbeat_that_came_with
     bank.on_asked = lambda write: None
     master.write(0, int(ENABLE))
     assert not bank.command.repeats
+
+
+def test_what_was_refused_for_another_reason_than_its_tare_holds_up_no_tare(make_bank, master_of) -> None:
+    """Of a program that tares when it may not start: the heartbeat of its frame is the one that was refused."""
+    bank = make_bank(has_lease=True)
+    master = master_of(bank, "10.0.0.1")
+    bank.on_asked = _refuse(ENABLE, RefusalReason.NOT_READY)
+    master.write(4, 1)
+    assert master.refusal(master.write, 0, ENABLE, 1200, 0, 0, 5).reason is RefusalReason.NOT_READY
+    master.write(0, int(TARE), 0, 0, 0, 5)
+    assert bank.command.control_word == TARE
