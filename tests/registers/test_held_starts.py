@@ -35,10 +35,11 @@ def test_a_start_repeats_the_refused_one_by_its_heartbeat_or_its_words(sent: Sta
     assert not refused().repeats("10.0.0.2", sent, 100.5)
 
 
-def test_a_frame_that_comes_on_and_on_is_the_refused_one_for_as_long_as_it_comes() -> None:
+@pytest.mark.parametrize("beat", [7, None])
+def test_a_frame_that_comes_on_and_on_is_the_refused_one_for_as_long_as_it_comes(beat: int | None) -> None:
     held = refused()
-    assert all(held.repeats(HOST, frame(7), 100.0 + 2.0 * k) for k in range(1, 6))
-    assert not held.repeats(HOST, frame(7), 113.5), "who has waited for three seconds has looked"
+    assert all(held.repeats(HOST, frame(beat), 100.0 + 2.0 * k) for k in range(1, 6))
+    assert not held.repeats(HOST, frame(beat), 113.5), "who has waited for three seconds has looked"
 
 
 @pytest.mark.parametrize(
