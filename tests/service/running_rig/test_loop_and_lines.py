@@ -100,6 +100,17 @@ def test_a_voltage_is_on_its_way_before_its_reasons_are_put_together(monkeypatch
     assert len(acts) > 4 and acts == ["set_voltage", "explain"] * (len(acts) // 2)
 
 
+def test_behind_an_exception_of_ours_the_safe_voltage_goes_before_its_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk gives our source for that: one that hangs would leave the force standing."""
+    wired = Wired().pressing(12.0)
+    acts: list[float | str] = []
+    monkeypatch.setattr(wired.loop.output, "set_voltage", lambda voltage_v, now_s: acts.append(voltage_v))
+    monkeypatch.setattr(wired.loop, "_log", lambda cause, sentence: acts.append(cause))
+    monkeypatch.setattr(wired.controller, "decide", lambda *_: 1 // 0)
+    wired.loop.refresh()
+    assert acts[:2] == [0.0, "internal"]
+
+
 def test_the_cause_of_a_restart_is_shown_until_there_is_a_fault_of_now() -> None:
     wired = Wired()
     wired.start(unclean=True)

@@ -12,12 +12,14 @@ from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.live_answers import AlarmTimes
+from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.last_tick import LastTick
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.running_rig.running_rig import RunningRig
+from gateway.service.supervisor.control_child import STOP_BOUND_S
 from tests.end_to_end.own_devices import OwnDevices
 from tests.service.running_rig.test_running_rig import devices, pressing, with_running_rig
 
@@ -59,6 +61,11 @@ def test_the_first_cause_of_an_end_is_told_to_the_guardian_and_to_people(devices
     said = with_running_rig(devices, scene)
     assert told == ["internal error: ZeroDivisionError('x / 0')"]
     assert any("A499" in line and "in a callback" in line for line in said)
+
+
+def test_a_ramp_to_the_end_is_over_while_the_guardian_still_waits_for_it() -> None:
+    """Else each slow ramp ends by a kill: no last safe frame of ours, no end in the audit, the tail of a recording lost."""
+    assert 4.0 <= running_rig._STOP_BOUND_S <= STOP_BOUND_S - 0.5
 
 
 @pytest.mark.parametrize("end", ["the guardian is gone", "a defect"])

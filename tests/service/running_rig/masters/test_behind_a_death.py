@@ -228,6 +228,16 @@ def test_behind_a_death_on_the_heels_of_a_fault_no_frame_presses_of_a_program_th
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
 
 
+def test_a_master_that_has_let_go_by_itself_is_no_lost_one() -> None:
+    """Behind a death its next order would be refused as one of a program that had hung."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(settings(lease_s=LEASE_S))
+    Handover({}, record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+    rig.holding().write(0, 0)
+    rig.until(State.OFF)
+    assert not kept.get("lost_beats")
+
+
 @pytest.mark.parametrize("ends", ["dies", "ends"])
 def test_behind_a_death_nothing_begins_that_was_refused_and_whose_heartbeat_has_come_again(ends: str) -> None:
     """The word comes without a heartbeat. Behind its first refusal the heartbeat had moved, and behind the second one it stood:
