@@ -68,6 +68,8 @@ def test_a_death_of_the_process_before_is_known_to_control_and_to_who_reads(
         assert (fault == FaultCode.MACHINE_BUSY) is bool(bits & WarningBit.RESTARTED) is bool(restarted)
 
     with_running_rig(devices, scene, restarted)
+    [started, *_] = read_audit(devices.directory / "state")
+    assert started["after"] == (restarted.sentence if restarted else "")
 
 
 def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:

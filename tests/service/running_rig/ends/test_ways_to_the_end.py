@@ -15,6 +15,7 @@ from gateway.service.live_answers import AlarmTimes
 from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.last_tick import LastTick
+from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
@@ -89,6 +90,21 @@ def test_who_can_no_longer_be_trusted_with_a_ramp_ends_at_once(devices: OwnDevic
 
     with_running_rig(devices, scene)
     assert devices.until_safe(ended_s[0]) < 1.0
+
+
+def test_until_its_last_part_is_closed_a_run_has_not_ended(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that dies in between would be taken by the next start for one that had ended well."""
+    running, found = devices.directory / "state" / "running", list[bool]()
+    close = Lateness.close
+    monkeypatch.setattr(Lateness, "close", lambda part: (found.append(running.exists()), close(part))[1])
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert running.exists()
+
+    with_running_rig(devices, scene)
+    assert found == [True] and not running.exists()
 
 
 def test_no_master_is_answered_while_the_device_is_let_go(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:
