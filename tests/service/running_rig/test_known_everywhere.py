@@ -36,12 +36,15 @@ def test_another_calibration_or_plant_is_known_everywhere_at_once(devices: OwnDe
         rig._on_calibration(activation.use(number, None))
         shown = rig.bank.read_registers(address, 1)
         assert int.from_bytes(shown, "big") == rig.controller.calibration_id == recordings.calibration.number == number
+        assert rig._guardian.kept["calibration"] == number, "a process behind this one's death would call it another"
         with pytest.raises(Refusal, match=f"calibration {number}"):
             rig.bank.write_registers(1, (2200).to_bytes(2), MASTER)
         recordings.plant_in_use = {"number": 99}
+        rig._guardian.keep(plant=99)
         other = replace(rig._rig, description="with another plant")
         rig._on_plant(other)
         assert recordings.plant_in_use == in_use_facts(other)
+        assert rig._guardian.kept["plant"] == rig._plants.status()["active"]
         assert rig._calibration_runs._rig is other, "what a run is recorded with"
         assert rig.controller.calibration_id == number, "it brings back no calibration of before"
         assert rig._rig is other, "what comes next is judged by it"
@@ -65,6 +68,8 @@ def test_a_death_of_the_process_before_is_known_to_control_and_to_who_reads(
         assert (fault == FaultCode.MACHINE_BUSY) is bool(bits & WarningBit.RESTARTED) is bool(restarted)
 
     with_running_rig(devices, scene, restarted)
+    [started, *_] = read_audit(devices.directory / "state")
+    assert started["after"] == (restarted.sentence if restarted else "")
 
 
 def test_a_port_that_is_gone_is_known_to_be_gone(devices: OwnDevices) -> None:

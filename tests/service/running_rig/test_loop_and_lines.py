@@ -12,6 +12,7 @@ from gateway.control.blame_for_silence import Held
 from gateway.control.inputs import Output
 from gateway.devices import ValveHost
 from gateway.devices.messages import ForceSample, RepeatedSample
+from gateway.processes.scheduling.scheduler_counters import ProcessorTime
 from gateway.profiles import load_device
 from gateway.registers.command import Status
 from gateway.registers.words import LimitedBy, State, StatusBit
@@ -73,6 +74,7 @@ def test_the_silence_of_each_line_is_judged_by_what_held_us_since_that_line_was_
     line = loop._line(now_s)
     assert line.cell_held.loop_late_s == now_s - loop.sample.time_s
     assert line.output_held.loop_late_s == pytest.approx(0.25)
+    assert loop._line(now_s + 10.0).cell_held == Held(), "that is no hiccup any more"
 
 
 def test_where_each_sample_decides_no_tick_decides_beside_it() -> None:
@@ -89,6 +91,30 @@ def test_where_each_sample_decides_no_tick_decides_beside_it() -> None:
     assert decided[0] <= 1.1 * (wired.loop.samples - samples)
 
 
+def test_a_late_step_is_told_how_long_its_process_has_waited_for_a_processor_since_the_last_tick() -> None:
+    """Else the loop is blamed for a machine that had no time for it."""
+    wired = Wired().pressing(12.0)
+    loop, waited_s = wired.loop, 5.0
+    loop.processor_time = lambda: ProcessorTime(on_cpu_s=1.0, waited_s=waited_s)
+    wired.run(0.05)
+    now_s, waited_s = wired.now_s + 0.25, 5.2
+    assert loop._line(now_s).waited_s == pytest.approx(0.2)
+
+
+def test_a_tick_decides_nothing_just_behind_a_command() -> None:
+    rig, decided = SmallRig().holding(), list[object]()
+    decide = rig.controller.decide
+    rig.controller.decide = lambda *told: (decided.append(told), decide(*told))[1]  # type: ignore[method-assign]
+    rig.ticks += 2  # since the last sample
+    rig.write(1, 1100)
+    assert len(decided) == 1
+    rig.loop.on_tick(1, 0.0)
+    assert len(decided) == 1
+    rig.ticks += 2
+    rig.loop.on_tick(1, 0.0)
+    assert len(decided) == 2
+
+
 def test_a_voltage_is_on_its_way_before_its_reasons_are_put_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """They cost more than the decision, and a lost master or an over-force would wait for them."""
     wired = Wired().pressing(12.0)
@@ -98,6 +124,17 @@ def test_a_voltage_is_on_its_way_before_its_reasons_are_put_together(monkeypatch
         monkeypatch.setattr(part, name, lambda *given, done=done, name=name: (acts.append(name), done(*given))[1])
     wired.run(0.1)
     assert len(acts) > 4 and acts == ["set_voltage", "explain"] * (len(acts) // 2)
+
+
+def test_behind_an_exception_of_ours_the_safe_voltage_goes_before_its_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk gives our source for that: one that hangs would leave the force standing."""
+    wired = Wired().pressing(12.0)
+    acts: list[float | str] = []
+    monkeypatch.setattr(wired.loop.output, "set_voltage", lambda voltage_v, now_s: acts.append(voltage_v))
+    monkeypatch.setattr(wired.loop, "_log", lambda cause, sentence: acts.append(cause))
+    monkeypatch.setattr(wired.controller, "decide", lambda *_: 1 // 0)
+    wired.loop.refresh()
+    assert acts[:2] == [0.0, "internal"]
 
 
 def test_the_cause_of_a_restart_is_shown_until_there_is_a_fault_of_now() -> None:

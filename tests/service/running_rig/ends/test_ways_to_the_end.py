@@ -12,12 +12,15 @@ from gateway.fieldbus.rtu_server import STANDSTILL_S
 from gateway.processes import message_link
 from gateway.service.guardian_line import GuardianLine
 from gateway.service.live_answers import AlarmTimes
+from gateway.service.running_rig import running_rig
 from gateway.service.running_rig.calibration_runs import CalibrationRuns
 from gateway.service.running_rig.last_tick import LastTick
+from gateway.service.running_rig.lateness import Lateness
 from gateway.service.running_rig.lines.rig_ports import RigPorts
 from gateway.service.running_rig.recording.recordings import Recordings
 from gateway.service.running_rig.rig_plants import RigPlants
 from gateway.service.running_rig.running_rig import RunningRig
+from gateway.service.supervisor.control_child import STOP_BOUND_S
 from tests.end_to_end.own_devices import OwnDevices
 from tests.service.running_rig.test_running_rig import devices, pressing, with_running_rig
 
@@ -61,6 +64,11 @@ def test_the_first_cause_of_an_end_is_told_to_the_guardian_and_to_people(devices
     assert any("A499" in line and "in a callback" in line for line in said)
 
 
+def test_a_ramp_to_the_end_is_over_while_the_guardian_still_waits_for_it() -> None:
+    """Else each slow ramp ends by a kill: no last safe frame of ours, no end in the audit, the tail of a recording lost."""
+    assert 4.0 <= running_rig._STOP_BOUND_S <= STOP_BOUND_S - 0.5
+
+
 @pytest.mark.parametrize("end", ["the guardian is gone", "a defect"])
 def test_who_can_no_longer_be_trusted_with_a_ramp_ends_at_once(devices: OwnDevices, end: str) -> None:
     """A ramp without a guardian is 4 s in which nothing writes the safe voltage when this process dies."""
@@ -82,6 +90,21 @@ def test_who_can_no_longer_be_trusted_with_a_ramp_ends_at_once(devices: OwnDevic
 
     with_running_rig(devices, scene)
     assert devices.until_safe(ended_s[0]) < 1.0
+
+
+def test_until_its_last_part_is_closed_a_run_has_not_ended(
+    devices: OwnDevices, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that dies in between would be taken by the next start for one that had ended well."""
+    running, found = devices.directory / "state" / "running", list[bool]()
+    close = Lateness.close
+    monkeypatch.setattr(Lateness, "close", lambda part: (found.append(running.exists()), close(part))[1])
+
+    async def scene(rig: RunningRig, guardian: socket.socket) -> None:
+        assert running.exists()
+
+    with_running_rig(devices, scene)
+    assert found == [True] and not running.exists()
 
 
 def test_no_master_is_answered_while_the_device_is_let_go(devices: OwnDevices, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,13 +7,14 @@ import pytest
 
 from gateway.codes.refusals import RefusalReason
 from gateway.control import LeaseAction
+from gateway.control.settings import SelfTestSettings
 from gateway.modbus import Peer
 from gateway.registers import Refusal
 from gateway.registers.words import State
 from gateway.service.running_rig.handover import Handover, left_of
 from tests.control.bench import settings
 from tests.service.running_rig.runs.test_runs_and_masters import LEASE_S
-from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, TAKE, TARE, SmallRig
+from tests.service.running_rig.simulated_rig import ENABLE, OTHER, OWNER, SELF_TEST, TAKE, TARE, SmallRig
 
 HUNG = (ENABLE, 3000, 0, 0, 139)
 
@@ -226,6 +227,21 @@ def test_behind_a_death_on_the_heels_of_a_fault_no_frame_presses_of_a_program_th
         assert refused and refused.reason is RefusalReason.HEARTBEAT_STALE
     rig.write(0, *HUNG[:4], 140)
     assert rig.run(0.1).state is not State.OFF, "its program goes on"
+
+
+@pytest.mark.parametrize("ends", ["by its own word", "with its self-test"])
+def test_a_master_whose_output_ends_as_it_has_ordered_is_no_lost_one(ends: str) -> None:
+    """Behind a death its next order would be refused as one of a program that had hung."""
+    kept: dict[str, Any] = {}
+    rig = SmallRig(replace(settings(lease_s=LEASE_S), self_test=SelfTestSettings()))
+    Handover({}, record=False).restore_held(rig.bank, rig.now(), lambda **facts: kept.update(facts))
+    if ends == "by its own word":
+        rig.holding().write(0, 0)
+    else:
+        rig.calibrating(SELF_TEST)
+        assert rig.bank.owner == OWNER.host
+    rig.until(State.OFF, within_s=120.0)
+    assert not kept.get("lost_beats")
 
 
 @pytest.mark.parametrize("ends", ["dies", "ends"])
