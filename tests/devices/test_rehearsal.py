@@ -221,3 +221,17 @@ def test_a_weight_in_registers_without_a_sign_is_told_by_its_type(tmp_path: Path
     (fault,) = loaded(tmp_path, "laumas-tlb", read_force={"modbus": registers, "unit": "kg"})
     assert "cannot be shown by a weight of type uint32: there is no room for a minus sign" in fault
     assert fault.endswith("say int32, or which bit is the sign in `negative`")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        {"terminator": "\r\n"},
+        {"question_terminator": "*"},
+        {"checksum": "dcon-sum"},
+        {"read_over": ["alive"]},
+    ],
+)
+def test_a_frame_that_has_its_own_end_is_told_no_other(words: dict[str, Any], tmp_path: Path) -> None:
+    (told,) = loaded(tmp_path, "laumas-tlb", **words)
+    assert "has its own end: leave terminator, checksum and read_over out" in told
