@@ -262,6 +262,8 @@ def test_limits_that_a_register_cannot_carry_are_refused_at_the_edge(document):
     assert [sentence for _, sentence, *_ in caught.value.faults] == ["3276.8 does not fit in int16 with scale 0.1"]
     ramp["max"] = 3276.7
     assert read_map(changed).find("force_ramp").maximum == 3276.7
+    (open_ended := small())["blocks"]["only"]["registers"][1]["max"] = 1.0
+    assert (read := read_map(open_ended).find("measured")).maximum == 1.0 and read.minimum is None
 
 
 def test_every_fault_is_told_at_once_with_its_place():
@@ -285,7 +287,7 @@ def test_every_fault_is_told_at_once_with_its_place():
 
 
 def test_a_document_that_is_no_map_is_told_so():
-    with pytest.raises(MapError, match="name is missing"):
+    with pytest.raises(MapError, match="blocks: is missing; map: name is missing; map: version is missing"):
         read_map({})
     with pytest.raises(MapError, match="is not a group of keys"):
         read_map({"name": "x", "version": 1, "blocks": [1]})
