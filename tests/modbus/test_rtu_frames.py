@@ -51,6 +51,9 @@ def test_coils_fill_as_many_bytes_as_they_need(count: int) -> None:
     coils = [place % 3 == 0 for place in range(count)]
     assert len(pack_bits(coils)) == -(-count // 8)
     assert unpack_bits(pack_bits(coils), count) == coils
+    if count:
+        with pytest.raises(ValueError, match="do not fit"):
+            unpack_bits(pack_bits(coils)[:-1], count)
 
 
 def test_a_frame_known_from_elsewhere() -> None:
