@@ -68,6 +68,12 @@ def test_a_cell_has_the_time_of_its_machine_to_move_and_never_less_than_0_3_s(la
     assert max(0.3, lag_s) - 1e-9 <= found_s < max(0.3, lag_s) + 0.3
 
 
+def test_a_value_that_has_only_just_come_may_stay_for_half_a_second_whatever_the_voltage_does() -> None:
+    words = watched([2.0] * 10 + [6.0] * 150, 0.02)
+    assert settings().supervision.frozen_s == 0.5
+    assert 49 <= words.index(next(filter(None, words))) <= 52
+
+
 def test_a_push_that_is_over_before_the_machine_answers_need_not_move_it() -> None:
     assert not any(watched([2.0] * 150 + [6.0] * 3 + [2.0] * 150, 0.5))
 
