@@ -107,3 +107,15 @@ def test_a_device_that_refuses_each_fall_behind_a_lost_answer_is_found() -> None
     line.is_lost = line.is_refusing = True
     line.run(0.5, 9.0, 0.1)
     assert line.exchange.fault is FaultCode.OUTPUT_REFUSED
+
+
+def test_a_refusal_behind_a_read_that_was_given_up_is_the_setting_s(wire: Wire) -> None:
+    """It repeats nothing that was asked before: taken for the late answer of the read, it left the setting unanswered."""
+    wire.settle(200)
+    asked = len(wire.written)
+    while len(wire.written) == asked or wire.last != "MON":
+        wire.tick()
+    wire.tick(REPLY_TIMEOUT_S + 0.001)
+    assert wire.last == "SET 200" and wire.exchange.unanswered_since_s is not None
+    wire.answer("OUT OF RANGE")
+    assert wire.exchange.unanswered_since_s is None
