@@ -92,6 +92,13 @@ def test_a_loop_has_waited_for_no_longer_than_it_is_late(kernel: Kernel) -> None
     assert held.loop_waited_s == held.loop_late_s == pytest.approx(0.24)
 
 
+def test_where_the_kernel_counts_no_turns_a_late_loop_is_late_all_the_same(kernel: Kernel) -> None:
+    kernel.ticks(5)
+    kernel.stall(0.3, 0.2)
+    held = kernel.lateness.since(kernel.now_s - 0.3, kernel.now_s, None)
+    assert held.loop_late_s == pytest.approx(0.29) and held.loop_waited_s is None
+
+
 def test_a_rig_that_takes_the_place_of_a_stopped_one_was_not_stopped(kernel: Kernel, tmp_path: Path) -> None:
     for _ in range(10):
         kernel.ticks(1, rig_runs=False)
