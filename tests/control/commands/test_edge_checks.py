@@ -224,6 +224,14 @@ def test_what_is_held_for_a_lost_master_rises_with_a_beat_alone(before: dict, as
     assert refused is None or (refused.reason, refused.bit) == (RefusalReason.HEARTBEAT_STALE, ControlBit(0))
 
 
+@pytest.mark.parametrize("repeats", [False, True])
+def test_another_heartbeat_is_no_beat_where_its_frame_was_refused_before(repeats: bool) -> None:
+    checked = checked_behind(Command(control_word=ENABLE, number=1, heartbeat=5, force_setpoint_n=8.0))
+    command = Command(control_word=ENABLE, number=2, heartbeat=6, force_setpoint_n=20.0, repeats=repeats)
+    refused = checked.refusal(ProposedWrite(command, lambda: ("force_setpoint",)), HELD)
+    assert (refused.reason if refused else None) is (RefusalReason.HEARTBEAT_STALE if repeats else None)
+
+
 @pytest.mark.parametrize(("state", "is_taken"), [(State.OFF, True), (State.RAMPING, False)])
 def test_what_is_written_on_the_way_to_nothing_is_refused_and_nothing_that_waits_at_rest(state: State, is_taken: bool):
     """A gateway that ends says so only where a force still goes down."""
