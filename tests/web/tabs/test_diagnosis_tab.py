@@ -62,6 +62,10 @@ def test_a_second_one_is_refused_and_a_cancelled_one_leaves_nothing(page, state,
     assert page.post("/api/v1/diagnosis/cancel").json["job"]["ended"] == "cancelled"
     assert not list((state / "diagnoses").iterdir())
     assert page.post("/api/v1/diagnosis/cancel").status == 409
+    (state / "diagnoses" / ".0002" / "of a page that was killed").mkdir(parents=True)
+    assert page.post("/api/v1/diagnosis/begin", {"recording": 2}).json["job"]["ended"] == "", "the next one is another"
+    assert page.post("/api/v1/diagnosis/cancel").json["job"]["ended"] == "cancelled"
+    assert not list((state / "diagnoses").iterdir())
 
 
 def test_the_end_of_the_page_ends_its_diagnosis(state, endless) -> None:
