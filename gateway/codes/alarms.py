@@ -135,7 +135,8 @@ ALARMS: Final = (
     Explanation(
         "A346",
         "residual watch, page or telemetry ended",
-        "A process that control can do without died (the line says which); the fourth time it stays off. Control goes on.",
+        "A process that control can do without died (the line says which); the fourth time it stays off, and its port refuses "
+        "callers. Control goes on.",
         "The machine ran out of memory (these are the first to go), somebody ended it, or an internal error.",
         "Look at the lines above it in the log; its section of the rig file (`residual_watch: {enabled: false}`) switches it "
         "off.",
