@@ -98,6 +98,24 @@ def test_a_stair_on_the_way_down_says_nothing_of_how_the_force_rises() -> None:
     assert ceiling.is_beyond(4.0, 0.0)
 
 
+@pytest.mark.parametrize("top_v", [4.0, 4.07])
+def test_the_top_is_what_the_machine_has_given_there_last(top_v: float) -> None:
+    """It has become stronger since its first way up, and nothing but the top tells how high the next one goes."""
+    low_n, top_n = model_n(2.0), 1.3 * model_n(top_v)
+    expected_n = top_n + (top_n - low_n) * (model_n(5.0) - model_n(top_v)) / (model_n(top_v) - low_n)
+    for room_n, is_beyond in ((0.35, True), (0.45, False)):
+        ceiling = ForceCeiling(expected_n + room_n, bsfm(), 0.0)
+        for volts, way, force_n in (
+            (2.0, 1, low_n),
+            (4.0, 1, model_n(4.0)),
+            (1.0, -1, 5.0),
+            (top_v, 1, top_n),
+            (1.0, -1, 5.0),
+        ):
+            ceiling.observe_row(LadderRow(PlannedStair(volts, way, 0, CalibrationPhase.LADDER), force_n, 1.0, True))
+        assert ceiling.is_beyond(5.0, 0.0) is is_beyond
+
+
 def model_n(voltage_v: float) -> float:
     return bsfm().force_n(voltage_v, 1.0)
 
