@@ -145,6 +145,22 @@ def test_the_patience_with_a_force_is_that_of_the_set_in_use(begins_with: Respon
     assert waited_s[1] == pytest.approx(waited_s[0], abs=0.02)
 
 
+@pytest.mark.parametrize("before", [{"dead_time_s": 0.02, "lag_s": 0.1}, {"dead_time_s": 0.3, "lag_s": 0.05}, None])
+def test_a_set_of_the_same_curves_is_controlled_by_its_own_response(before: dict[str, float] | None) -> None:
+    """By another one's dead time the trim would be four times as fast as this machine bears."""
+    volts = []
+    own = Response(dead_time_s=0.3, lag_s=0.1)
+    for responses in ((own,), (Response(**before) if before else None, own)):
+        bench = Bench()
+        for response in responses:
+            bench.controller.use(CalibrationInUse(bsfm(), 2, response))
+        bench.run(0.3)
+        bench.enable(12.0)
+        bench.run(2.0)
+        volts.append([record.output.voltage_v for record in bench.history])
+    assert volts[0] == volts[1] and max(volts[0]) > 1.0
+
+
 @pytest.mark.parametrize("scale", [0.7, 1.4])
 def test_a_set_that_is_swapped_in_voltage_mode_carries_nothing_over_into_force_mode(scale: float):
     """The voltage was the master's, so none has to fade: it goes on from the force that the new set expects of it."""
