@@ -35,7 +35,7 @@ def test_the_first_0_is_no_beat() -> None:
 
 def test_without_a_lease_nobody_is_lost() -> None:
     lease = Lease(None)
-    assert not lease.is_lost(1e6, False) and lease.is_fresh_since(1e6, 2e6)
+    assert not lease.is_lost(1e6, False) and lease.is_fresh_since(1e6, 2e6) and lease.is_within(1e6, 2e6)
 
 
 def test_only_another_heartbeat_renews_it() -> None:
