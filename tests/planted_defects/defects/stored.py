@@ -213,4 +213,6 @@ DEFECTS = (
            ("service/running_rig/runs/test_end_beside_a_run.py",)),
     Defect("of a store that is not mounted a fleet's days are missing without a word", "fleet/tasks.py",
            "if is_file(path) or not exists(path)]", "if is_file(path)]", ("fleet/test_tasks.py",)),
+    Defect("a line that a power cut has left without the one before stays in the audit", "audit/unsynced_lines.py",
+           "                    check_link(fields, before)", "                    pass", ("audit/test_unsynced_lines.py",)),
 )  # fmt: skip
