@@ -4,6 +4,8 @@ from dataclasses import replace
 from ipaddress import ip_network
 from typing import Any
 
+import pytest
+
 from gateway.fieldbus.connection import GIVES_WAY_S
 from gateway.fieldbus.peers import Peers
 from gateway.fieldbus.socket_transport import READ_BYTES
@@ -27,12 +29,14 @@ def test_half_a_request_is_waited_for_no_longer_than_partial_s(stand: Any, deliv
     assert (far.ended, made.log[0][0]) == ("closed", "partial")
 
 
-def test_a_byte_now_and_then_does_not_keep_half_a_request_alive(stand: Any, deliver: Any) -> None:
-    made = stand(partial_s=5.0)
+@pytest.mark.parametrize("every_s", [1.0, 0.5])
+def test_a_byte_now_and_then_does_not_keep_half_a_request_alive(stand: Any, deliver: Any, every_s: float) -> None:
+    """Nor one for each look at the connection."""
+    made = stand(partial_s=8.0 * every_s)
     connection, far = made.connect()
     for byte in framed(READ)[:11]:
         deliver(connection, far, bytes((byte,)))
-        made.wait(1.0)
+        made.wait(every_s)
     assert (far.ended, made.log[0][0]) == ("closed", "partial")
 
 
