@@ -95,7 +95,9 @@ class OptionalChildSupervisor:
 def _refuse_callers(listen: int) -> None:
     """Let the kernel refuse who calls from now on, and who waits already. The descriptor stays ours: without it the next
     control process would open another one, which nobody answers either."""
-    listener = socket.socket(fileno=listen)
-    with contextlib.suppress(OSError):  # then they wait, as before; the guardian goes on
-        listener.shutdown(socket.SHUT_RD)
-    listener.detach()
+    with contextlib.suppress(OSError):  # then they wait, and the guardian goes on
+        listener = socket.socket(fileno=listen)
+        try:
+            listener.shutdown(socket.SHUT_RD)
+        finally:
+            listener.detach()
