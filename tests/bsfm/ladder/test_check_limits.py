@@ -51,6 +51,21 @@ def test_a_force_that_dips_on_the_way_down_has_no_inverse_either() -> None:
     assert "contact or air lost on the way" in str(error), "what a ladder cannot see of itself"
 
 
+@pytest.mark.parametrize(("share", "is_taken"), [(0.017, True), (0.023, False)])
+def test_a_stair_may_lie_below_the_one_before_by_a_fiftieth_of_the_range(share: float, is_taken: bool) -> None:
+    table = recorded(stairs())
+    force_n, rows = table["force_n"].copy(), np.arange(len(table["force_n"]))
+    is_up = rows // ROWS_A_STAIR % (2 * (STAIRS_UP - 1)) < STAIRS_UP
+    before, dips = (is_up & np.isclose(table["command_v"], volts) for volts in (4.8, 5.2))
+    has_settled = rows % ROWS_A_STAIR >= ROWS_A_STAIR // 2
+    rise_n = np.mean(force_n[dips & has_settled]) - np.mean(force_n[before & has_settled])
+    force_n[dips] -= rise_n + share * np.ptp(force_n)
+    if is_taken:
+        check_table(table | {"force_n": force_n})
+    else:
+        assert refuse_table(table | {"force_n": force_n}).flaw is LadderFlaw.NOT_INCREASING
+
+
 def test_steps_that_the_noise_hides_are_not_called_a_slipping_tool() -> None:
     error = refuse_table(with_force(lambda force: force + noise_n(len(force), 6.0)))
     assert error.flaw is LadderFlaw.NOT_INCREASING and "which may hide the steps" in str(error)
