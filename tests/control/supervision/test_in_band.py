@@ -209,6 +209,13 @@ def test_a_voltage_settles_where_it_is_out_and_not_on_its_way_or_at_none() -> No
     assert check.judge_voltage(asked, at(0.875), is_slewing=False) is MOVE
 
 
+def test_a_lower_voltage_which_is_out_at_once_settles_anew() -> None:
+    check = SettlingCheck(UNREACHABLE_S)
+    asked = [(0.0, 3.0), (0.25, 3.0), (0.5, 2.0), (0.625, 2.0), (0.75, 2.0)]
+    told = [check.judge_voltage(demand(voltage_v=volts), at(now_s), is_slewing=False) for now_s, volts in asked]
+    assert told == [MOVE, SETTLE, MOVE, MOVE, SETTLE]
+
+
 @pytest.mark.parametrize(
     ("swing_n", "in_band_time_s", "is_noisy"),
     [(1.5, 0.25, True), (0.9, 0.25, False), (0.9, 20.0, False), (8.0, 0.25, True)],
