@@ -45,6 +45,17 @@ def test_a_reading_that_is_old_or_none_counts_for_nothing(reading: dict[str, boo
     assert not run.is_waiting and run.rest_n == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("rate_hz", "count"), [(100.0, 21), (50.0, 11), (10.0, 6)])
+def test_a_stair_is_judged_by_a_fifth_of_a_second_and_by_six_readings_at_least(rate_hz: float, count: int) -> None:
+    """A mean of fewer is more of its noise. A force that climbs on and on never settles."""
+    run = run_of(stair(4.0), stair(6.0))
+    now_s, _ = feed(run, 10.0, 2.0, 1.0)
+    for number in range(round(1.5 * rate_hz)):
+        force_n = 1.0 + 6.0 * number / rate_hz
+        run.step(now_s + number / rate_hz, Reading(cell_n=force_n, contact_n=force_n, is_new=True, is_usable=True))
+    assert run.done == 1 and abs(len(run._window) - count) <= 1
+
+
 def test_behind_its_last_stair_a_ladder_stands_at_rest() -> None:
     run = run_of(stair(4.0))
     now_s, _ = feed(run, 10.0, 1.0, 0.0)
