@@ -57,6 +57,17 @@ def test_a_dwell_stays_where_the_move_before_has_ended() -> None:
     assert moved.voltage_v(2.5) == pytest.approx(0.5 * TOP_V)
 
 
+def test_a_share_is_one_of_the_voltages_between_the_least_and_the_highest() -> None:
+    asked = plan(
+        Move(do=MoveKind.STEP, to_share=0.5, hold_s=1.0),
+        Move(do=MoveKind.REVERSALS, size_share=0.2, times=1, hold_s=1.0),
+    )
+    for least_v in (0.0, 1.0):
+        turns = segments_of(asked, replace(LIMITS, voltage_min_v=least_v), bsfm())[1:3]
+        size_v, middle_v = 0.2 * (TOP_V - least_v), least_v + 0.5 * (TOP_V - least_v)
+        assert [turn.to_v for turn in turns] == pytest.approx([middle_v + size_v / 2.0, middle_v - size_v / 2.0])
+
+
 def test_newtons_are_those_of_the_rising_branch() -> None:
     moved = schedule(Move(do=MoveKind.STEP, to_n=20.0, hold_s=1.0))
     assert bsfm().branches.rising.value(moved.voltage_v(0.5)) == pytest.approx(20.0)

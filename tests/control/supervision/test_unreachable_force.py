@@ -200,6 +200,13 @@ def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
     assert ("(A303): check the unit on the amplifier" in unreachable_words(seen)) == is_told
 
 
+@pytest.mark.parametrize(("expected_n", "is_told"), [(3.1, True), (12.0, False), (1.3, False)])
+def test_a_small_force_of_another_factor_does_not_name_kgf(expected_n: float, is_told: bool) -> None:
+    seen = Evidence(voltage_v=0.3, measured_n=0.29, expected_n=expected_n, pressure_pa=24e3, expected_pa=24e3)
+    assert "no contact with the workpiece" in unreachable_words(seen)
+    assert ("kgf" in unreachable_words(seen)) == is_told
+
+
 def test_without_a_pressure_less_than_half_of_the_force_may_be_no_air_and_half_of_it_is_not() -> None:
     words = [unreachable_words(Evidence(voltage_v=3.0, measured_n=n, expected_n=10.0)) for n in (2.4, 4.9, 5.0)]
     assert words[0] == "no air, valve closed or no contact" and words[2].startswith("target not reached")
