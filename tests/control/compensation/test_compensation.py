@@ -86,6 +86,10 @@ def test_the_constant_zero_is_left_to_the_tare():
     assert cell.force_n(30.0 + 0.002 * 30.0**2 + 1.5, nan, 0.0) == pytest.approx(31.5)
 
 
+def test_a_curve_of_the_third_power_alone_is_straightened_too():
+    assert CellMap(cubic_per_n2=1.0e-4).force_n(30.0 + 1.0e-4 * 30.0**3, nan, 0.0) == pytest.approx(30.0)
+
+
 def test_without_a_thermometer_a_warm_cell_is_taken_as_it_reads():
     cell = CellMap(span_per_k=0.01, zero_n_per_k=0.5)
     assert cell.force_n(20.0, nan, 3.0) == 20.0

@@ -116,6 +116,7 @@ def test_a_move_without_its_sense_is_told_with_its_place(move: Move, key: str, s
 
 
 def test_an_empty_plan_and_an_endless_one_are_refused() -> None:
+    assert ("parts", 0, "moves") in dict(plan_faults(plan()))
     assert [path for path, _ in plan_faults(ExperimentPlan(name="x", parts=()))] == [("parts",)]
     endless = plan(Move(do=MoveKind.REVERSALS, size_share=0.1, times=1000, hold_s=3600.0))
     assert "allowed up to 7200 s" in next(plan_faults(endless))[1]

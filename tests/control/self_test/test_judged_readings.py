@@ -164,3 +164,10 @@ def test_a_zero_that_moves_is_told_by_how_much_and_what_may_move_it() -> None:
     *_, zero = judge_rest([(0.01 * k, 0.1 + 0.05 * k + 0.001 * (k % 2)) for k in range(100)], RIG)
     assert zero.verdict is FAILED and "it moves by +5.00 N/s" in zero.text
     assert zero.text.endswith(": cell or amplifier drifts, or something still moves the tool")
+
+
+def test_a_zero_that_is_off_stays_a_failure_where_it_moves_a_little_too() -> None:
+    *_, zero = judge_rest([(0.01 * k, -4.0 + 0.001 * k + 0.001 * (k % 2)) for k in range(100)], RIG)
+    assert zero.verdict is FAILED and "it moves by +0.10 N/s" in zero.text
+    *_, still = judge_rest([(0.01 * k, 0.001 * k + 0.001 * (k % 2)) for k in range(100)], RIG)
+    assert still.verdict is WARNED and "it moves by +0.10 N/s" in still.text

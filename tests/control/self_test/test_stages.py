@@ -124,6 +124,12 @@ def test_what_is_wrong_with_the_force_ends_it_with_its_item_and_nothing_is_claim
     assert verdicts[Item.LEAK] is NOT_TESTED and played.course[-1][0] < REST_S + RISE_S + 2.0 * SETTLING_S + 0.1
 
 
+def test_by_a_cell_whose_sign_is_wrong_no_zero_is_passed() -> None:
+    played = Played(lambda volts: -bsfm().force_n(volts, 1.0)).to_the_end()
+    assert played.verdicts()[Item.ZERO] is NOT_TESTED
+    assert "the wrong sign" in played.run.findings[Item.ZERO].text
+
+
 @pytest.mark.parametrize(("at_rest_n", "pressed_n", "is_gone"), [(1.0, 0.0, True), (-1.0, -1.8, False)])
 def test_a_force_at_rest_that_goes_away_may_have_lost_its_workpiece(
     at_rest_n: float, pressed_n: float, is_gone: bool

@@ -169,12 +169,18 @@ def test_a_ratio_that_was_seen_counts_more_than_the_profiles() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pressure_pa", "learned", "words"),
-    [(nan, False, "no air, valve closed or no contact"), (60e3, True, "no air, valve closed or no contact")],
+    ("pressure_pa", "measured_n", "words"),
+    [(nan, 0.1, "valve closed or no contact"), (60e3, 0.1, "valve closed or no contact"), (60e3, 3.2, "; target not")],
 )
-def test_between_the_bounds_nothing_is_claimed(pressure_pa: float, learned: bool, words: str) -> None:
+def test_between_the_bounds_nothing_is_claimed(pressure_pa: float, measured_n: float, words: str) -> None:
+    learned = pressure_pa > 0.0
     seen = Evidence(
-        voltage_v=1.0, measured_n=0.1, expected_n=8.0, pressure_pa=pressure_pa, expected_pa=100e3, learned=learned
+        voltage_v=1.0,
+        measured_n=measured_n,
+        expected_n=8.0,
+        pressure_pa=pressure_pa,
+        expected_pa=100e3,
+        learned=learned,
     )
     assert words in unreachable_words(seen)
     assert ("60 kPa measured, 100 kPa expected" in unreachable_words(seen)) == learned
@@ -187,14 +193,8 @@ def test_between_the_bounds_nothing_is_claimed(pressure_pa: float, learned: bool
 def test_a_tenth_of_a_small_force_names_kgf_beside_the_missing_contact(
     measured_n: float, was_in_band: bool, is_told: bool
 ) -> None:
-    seen = Evidence(
-        voltage_v=0.26,
-        measured_n=measured_n,
-        expected_n=3.1,
-        pressure_pa=24e3,
-        expected_pa=24e3,
-        was_in_band=was_in_band,
-    )
+    seen = Evidence(voltage_v=0.26, measured_n=measured_n, expected_n=3.1, pressure_pa=24e3, expected_pa=24e3)
+    seen = replace(seen, was_in_band=was_in_band)
     assert "air is there, so no contact with the workpiece" in unreachable_words(seen)
     assert ("kgf read as N" in unreachable_words(seen)) == is_told
     assert ("(A303): check the unit on the amplifier" in unreachable_words(seen)) == is_told
