@@ -68,5 +68,7 @@ def test_what_does_not_fit_is_said_not_wrapped():
 def test_unavailable():
     assert pack_number("int16", WordOrder.ABCD, math.nan) == b"\x80\x00"
     assert math.isnan(unpack_number("int16", WordOrder.ABCD, b"\x80\x00"))
+    for kind in ("int32", "float32"):  # no other kind has a number that means it
+        assert unpack_number(kind, WordOrder.ABCD, pack_number(kind, WordOrder.ABCD, -32768)) == -32768
     assert float32(1e39) == math.inf
     assert float32(-1e39) == -math.inf

@@ -6,9 +6,11 @@ import pytest
 
 from gateway.modbus import Peer
 from gateway.profiles import load_register_map
-from gateway.registers import BankRules, RegisterBank
+from gateway.registers import BankRules, MapError, RegisterBank
+from gateway.registers.map.map_reader import read_map
 from gateway.registers.refusal import Refusal
 from gateway.registers.values import WordOrder, pack_number
+from tests.registers.test_register_map import small
 
 SHIPPED = (Path(__file__).parents[3] / "profiles" / "registers" / "force-v1.yaml").read_text()
 FLOATS = SHIPPED[SHIPPED.index("  float_cdab:") : SHIPPED.index("  proof:")]
@@ -70,3 +72,11 @@ def test_a_word_of_the_command_that_a_map_has_read_only_is_written_by_nobody(tmp
     with pytest.raises(Refusal, match="force_ramp"):
         bank.write_registers(1, bytes((4, 176, 0, 100)), PEER)
     assert bank.command.force_ramp_n_per_s == 0.0
+
+
+@pytest.mark.parametrize("block", [{"registers": [], "repeats": {}}, {}])
+def test_a_block_has_either_registers_or_repeats(block: dict[str, object]) -> None:
+    document = small()
+    document["blocks"]["other"] = {"first": 20, "last": 29} | block
+    with pytest.raises(MapError, match="has either registers or repeats"):
+        read_map(document)

@@ -52,6 +52,7 @@ BAD_WORDS = [
     ((200, 0, 0, 0x4140), 3, R.HALF_VALUE, 200, NAN, "W206 force_setpoint@float_abcd"),
     ((416, 0x449A), 3, R.HALF_VALUE, 416, NAN, "W206 byte_order_echo"),
     ((416, 0x9A44, 0x0050), 3, R.OUT_OF_RANGE, 416, None, "W204 byte_order_echo"),
+    ((416, 0x449A, 0x4000), 3, R.OUT_OF_RANGE, 416, 1234.0, "W204 byte_order_echo = 1234, allowed 1234.5"),
     ((416, 0x7FC0, 0), 3, R.NOT_FINITE, 416, NAN, "W207 byte_order_echo"),
     ((16, 1), 2, R.ADDRESS, 16, NAN, "W203"),
     ((40001, 1), 2, R.ADDRESS, 40001, NAN, "W202"),
@@ -101,6 +102,7 @@ def test_bad_floats_are_refused_in_both_word_orders(master, address, value, reas
         refusal = master.refusal(write, at, value)
         assert (refusal.code, refusal.reason, refusal.address) == (3, reason, at)
         assert refusal.sentence.startswith(sentence)
+        assert master.float(120) == pytest.approx(value, rel=1e-6, nan_ok=True)
 
 
 def test_swapped_words_are_recognised_in_both_blocks(master):
@@ -108,6 +110,7 @@ def test_swapped_words_are_recognised_in_both_blocks(master):
     refusal = master.refusal(master.write_float_cdab, 202, 12.0)
     assert (refusal.code, refusal.reason) == (3, R.WORDS_SWAPPED)
     assert refusal.sentence.startswith(f"{seen} CDAB, use block 300 or mbpoll -B")
+    assert 0.0 < master.float(120) < 1e-40, "as it was read"
     refusal = master.refusal(master.write_float, 302, 12.0)
     assert refusal.sentence.startswith(f"{seen} ABCD, use block 200")
 

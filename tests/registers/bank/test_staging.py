@@ -232,6 +232,13 @@ def test_a_slot_is_selected_by_its_number(bank, master, register_map):
     assert (len(seen), master.word(1149)) == (2, 7)
 
 
+@pytest.mark.parametrize(("address", "word"), [(1145, 4), (1145, 1), (1149, 3)])
+def test_what_the_staging_block_does_not_take_is_shown_with_its_value(bank, master, address, word):
+    bank.staging.on_commit = bank.staging.on_select = None
+    assert master.refusal(master.write, address, word).address == address
+    assert master.float(120) == word
+
+
 def test_the_active_set_is_read_back_with_its_crc(bank, register_map):
     given = replace(CALIBRATION, slip_radii_v=(0.5, 1.0), slip_shares=(0.75, 0.25))
     bank.set_active_model(given, slot=4)
