@@ -11,6 +11,7 @@ from gateway.devices.binary.register_access import RegisterAccess, RegisterType
 from gateway.devices.binary.rtu_framing import LONGEST_ADU, answers
 from gateway.devices.binary.weight_registers import RegisterBit, WeightRegisters
 from gateway.devices.device_checks.identity import Identity
+from gateway.devices.device_checks.watchdog import WatchdogQuestion, WatchdogState
 from gateway.devices.exchange import (
     PressureExchange,
     PressureRange,
@@ -22,6 +23,7 @@ from gateway.devices.exchange import (
 from gateway.devices.fields import Text, ValueRefused
 from gateway.devices.force_reading import ForceReading
 from gateway.devices.messages import ForceSample, Quality
+from gateway.devices.valve_profile import ValveDirection
 from tests.profile_files import load_device
 
 VOLTS = {"device": (0.0, 1023.0), "voltage_v": (0.0, 10.0)}
@@ -45,6 +47,17 @@ def bit(register: int) -> RegisterBit:
     return RegisterBit(register=register, bit=0)
 
 
+def valve_words(**words: str) -> object:
+    assert VALVE.read_valve
+    return replace(VALVE.read_valve, words={word: ValveDirection(means) for word, means in words.items()})
+
+
+def watchdog_words(**words: str) -> WatchdogQuestion:
+    means = {word: WatchdogState(state) for word, state in words.items()}
+    return WatchdogQuestion(ask="WDT?", answer="WDT {state:ARMED|TRIP}", words=means)
+
+
+VALVE = load_device("mcu-valve")
 WHO = Identity(ask="ID?", answer="ID {model:s}", models=("A1",))
 
 
@@ -57,6 +70,18 @@ WHO = Identity(ask="ID?", answer="ID {model:s}", models=("A1",))
         ),
         (lambda: replace(load_device("mcu-valve"), identity=WHO), "a valve is never asked what it is"),
         (lambda: replace(load_device("hx711-line"), identity=WHO), "that streams is never asked what it is"),
+        (lambda: replace(VALVE, read_valve=None), "a valve needs set_valve and read_valve"),
+        (lambda: replace(VALVE, set_valve=None), "a valve needs set_valve and read_valve"),
+        (lambda: replace(VALVE, set_voltage=load_device("mcu-line").set_voltage), "belong to other roles"),
+        (lambda: replace(VALVE, watchdog=load_device("mcu-line").watchdog), "watchdog belongs to an output"),
+        (
+            lambda: replace(load_device("mcu-line"), set_voltage=voltage(ask="V {volts:.3f}")),
+            "has no answer and there is no",
+        ),
+        (lambda: valve_words(PUSH="push", PULL="pull", UP="pull"), "words names UP, which .VALVE"),
+        (lambda: valve_words(PUSH="push", PULL="push"), "which word means push and which one means pull"),
+        (lambda: watchdog_words(ARMED="armed"), "words must name each word of {state:...}, and no other"),
+        (lambda: watchdog_words(ARMED="armed", TRIP="tripped", OFF="off"), "must name each word"),
         (lambda: RegisterAccess(function=6, register=0, type="uint32"), "function 6 writes one register"),
         (lambda: voltage(), "`ask` is missing"),
         (lambda: voltage(WRITES, ask="SET {counts:d}"), "leave `ask` and `answer` out"),
@@ -97,6 +122,7 @@ def test_what_contradicts_itself_is_refused(make: Callable[[], object], told: st
         lambda: pressure(READS),
         lambda: ForceReading(frame="{force:d}", newton_per_count=0.1),
         lambda: ForceReading(frame="{force:+08.2f}", ask="W?", before="#**"),
+        lambda: watchdog_words(ARMED="armed", TRIP="tripped"),
         lambda: weight(first=10, last=41),
         lambda: weight(first=11, last=11),
         lambda: weight(weight=12, type="int32", negative=bit(10), overload=(bit(11),)),
