@@ -72,7 +72,8 @@ def test_a_run_that_was_refused_over_a_fault_holds_up_no_enable_behind_its_reset
         bank.on_asked = lambda write: None
         master.write(4, 3)
         if is_held:
-            assert master.refusal(master.write, 0, int(ENABLE)).reason is RefusalReason.CALIBRATION_HELD
+            refusal = master.refusal(master.write, 0, int(ENABLE))
+            assert (refusal.reason, refusal.value) == (RefusalReason.CALIBRATION_HELD, float(ENABLE))
         else:
             master.write(0, int(ENABLE))
             assert bank.command.control_word == ENABLE

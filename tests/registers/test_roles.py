@@ -8,7 +8,7 @@ import pytest
 from gateway.codes.refusals import RefusalReason
 from gateway.modbus import Peer, Role, answer
 from gateway.registers.map.register_map import Block
-from gateway.registers.roles import WRITE_ROLES, render_roles, write_roles
+from gateway.registers.roles import WRITE_ROLES, render_roles, role_refusal, write_roles
 
 ZERO_WORD = {
     "command": 4,
@@ -106,6 +106,12 @@ def test_a_block_that_the_table_has_forgotten_is_locked(register_map):
 def test_the_sentence_says_what_would_help(bank, peer, address, cure):
     answer(struct.pack(">BHH", 6, address, 0), bank, peer)
     assert bank.last_refusal and cure in bank.last_refusal.sentence
+
+
+@pytest.mark.parametrize("host", ["10.0.0.1", "serial:2"])
+def test_what_only_an_admin_may_no_setting_of_the_rig_allows(host):
+    told = role_refusal(Peer(host), Block("recipes", 2000, 2010), Role.ADMIN, 2000).sentence
+    assert told.endswith("block recipes (2000 .. 2010) needs admin: connect by TLS with a certificate that has it")
 
 
 def test_the_table_for_people_is_the_one_that_is_asked(register_map):

@@ -229,7 +229,7 @@ def test_a_bit_that_was_held_beyond_its_run_begins_none_until_it_was_0(make_bank
     other.write(4, 7)
     bank.write_bits(4, [False], master.peer)
     refusal = master.refusal(master.write, 0, bit)
-    assert (refusal.code, refusal.reason) == (4, RefusalReason.CALIBRATION_HELD)
+    assert (refusal.code, refusal.reason, refusal.value) == (4, RefusalReason.CALIBRATION_HELD, bit)
     assert refusal.sentence.endswith(f"{name} was kept at 1 beyond the end of its run: write it as 0 once, then as 1")
     master.write(0, 0)
     master.write(0, bit)
