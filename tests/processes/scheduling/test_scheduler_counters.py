@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from gateway.codes.explanation import BUSY_CURE
 from gateway.processes.exit_cause import EndCause
 from gateway.processes.scheduling import priority
 from gateway.processes.scheduling.scheduler_counters import (
@@ -54,7 +55,8 @@ def test_the_largest_part_of_a_silence_is_its_cause(ran_s: float, waited_s: floa
 
 @pytest.mark.parametrize(("was_late", "cause"), [(True, BUSY), (False, STALLED)])
 def test_a_kernel_that_counts_nothing_leaves_our_own_lateness(was_late: bool, cause: EndCause) -> None:
-    assert explain_silence(Silence(0.2, 0.1, None, "", was_late), "the load is not known").cause is cause
+    told = explain_silence(Silence(0.2, 0.1, None, "", was_late), "the load is not known")
+    assert told.cause is cause and (BUSY_CURE in told.sentence) is was_late
 
 
 def test_what_the_kernel_says_is_read_as_it_stands(tmp_path: Path) -> None:
