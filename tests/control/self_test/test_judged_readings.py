@@ -100,6 +100,7 @@ def falling(n_per_s: float, from_n: float = 10.0, readings: int = 41) -> list[tu
             "; pressure +2.0 % per second lost, allowed 1.3 %, fails above 4.3 %",
         ),
         (falling(0.0), falling(-5e3, 1e5), FAILED, "; pressure +5.0 %"),
+        (falling(-0.5), falling(0.0, 1e5), FAILED, "; pressure +0.0 %"),  # of the force alone
         (falling(0.0), falling(-5e3, 1e5, 29), PASSED, "N/s"),  # too few to tell
         (falling(0.0), falling(-5e3, 1e5, 30), FAILED, "; pressure +5.0 %"),
     ],

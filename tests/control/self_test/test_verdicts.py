@@ -178,6 +178,7 @@ def test_where_friction_leaves_no_room_the_scale_is_not_judged() -> None:
     found = judge_scale(1.0, 1.0, 0.0, 4.0)
     assert found.verdict is NOT_TESTED
     assert found.text.endswith("; a friction of 4.0 N leaves too little room: raise self_test.force_n")
+    assert judge_scale(0.2, 1.0, 0.0, 4.0).verdict is NOT_TESTED, "nor is a fifth of it known to be wrong then"
     assert judge_scale(10.0, 10.0, 0.5, 1.0).text.endswith("allowed 63% .. 137%, fails outside 30% .. 300%")
 
 
