@@ -136,6 +136,7 @@ def test_a_run_goes_through_zero_and_check_and_then_by_the_clock_to_its_end_at_z
     while bench.controller.active_run.running:
         bench.run(0.01)
         phases.append(CalibrationPhase(bench.last.calibration_phase))
+        assert phases[-1] is not CalibrationPhase.CHECK or bench.controller.active_run.progress == 0.0
     assert list(dict.fromkeys(phases)) == [
         CalibrationPhase.ZERO, CalibrationPhase.CHECK, CalibrationPhase.EXPERIMENT, CalibrationPhase.RECORDED,
     ]  # fmt: skip

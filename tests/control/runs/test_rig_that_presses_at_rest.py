@@ -6,6 +6,7 @@ import pytest
 
 from gateway.bsfm import Bsfm
 from gateway.control import CalibrationInUse, Controller
+from gateway.control.messages import tare_sentence
 from gateway.control.runs.active_run import RecordedPlan
 from gateway.control.runs.experiment_plan import Move, MoveKind
 from gateway.control.runs.ladder_stairs import CalibrationPlan
@@ -67,3 +68,8 @@ def test_a_zero_that_may_be_what_presses_at_the_safe_voltage_is_told_as_such(
     bench.write(control_word=ControlBit.TARE)
     (told,) = [event for event in bench.events if event.startswith("tare: zero at")]
     assert ("press at the safe voltage: if the tool touches, lift it" in told) is is_told
+
+
+@pytest.mark.parametrize(("zero_n", "is_told"), [(1.9, False), (2.1, True), (5.9, True), (6.1, False)])
+def test_a_zero_that_is_no_such_force_is_not_told_as_one(zero_n: float, is_told: bool) -> None:
+    assert ("4.0 N press at the safe voltage" in tare_sentence(zero_n, 4.0)) is is_told

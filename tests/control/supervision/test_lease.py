@@ -86,6 +86,17 @@ def test_a_sign_of_life_is_one_that_came_later_and_within_one_length(
     assert lease.would_be_fresh_since(since_s, now_s, 8)
 
 
+@pytest.mark.parametrize(("since_s", "now_s", "is_fresh"), [(9.9, 10.4, True), (9.9, 10.6, False), (10.1, 10.2, False)])
+def test_a_beat_of_a_refused_write_is_a_sign_of_life_for_one_length(
+    since_s: float, now_s: float, is_fresh: bool
+) -> None:
+    lease = Lease(0.5)
+    for at_s, heartbeat in ((8.0, 7), (10.0, 8), (10.0, 7)):
+        lease.hear_refused(at_s, heartbeat, *block_of("a"))
+    lease.pass_over(7, block_of("a")[1])
+    assert lease.would_be_fresh_since(since_s, now_s, 7) is is_fresh
+
+
 def test_a_rig_that_says_no_more_than_a_length_goes_to_the_safe_voltage_behind_it() -> None:
     bench = enabled(settings(lease_s=0.2))
     bench.force(12.0)
