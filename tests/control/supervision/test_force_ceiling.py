@@ -52,6 +52,21 @@ def test_a_partial_reversal_is_no_top_of_the_ladder() -> None:
     assert not ceiling.is_beyond(5.5, 0.0)
 
 
+@pytest.mark.parametrize(("lately_n", "is_beyond"), [((19.0, 26.0), False), ((30.0, 44.0), True)])
+def test_a_machine_that_has_become_stronger_is_judged_by_its_last_stairs(
+    lately_n: tuple[float, float], is_beyond: bool
+) -> None:
+    ceiling = ForceCeiling(MOST_N, bsfm(), 0.0)
+    for volts, direction, cell_n in (
+        (3.0, 1, 19.0),
+        (5.0, 1, 33.0),
+        (3.0, -1, 20.0),
+        *((volts, 1, cell_n) for volts, cell_n in zip((3.0, 4.0), lately_n, strict=True)),
+    ):
+        ceiling.observe_row(LadderRow(PlannedStair(volts, direction, 0, CalibrationPhase.LADDER), cell_n, 1.0, True))
+    assert ceiling.is_beyond(5.0, 0.0) is is_beyond
+
+
 @pytest.mark.parametrize(("weight_n", "is_reached"), [(0.0, False), (20.0, True)])
 def test_the_force_of_now_is_judged_with_it_too(weight_n: float, is_reached: bool) -> None:
     assert ceiling_at(35.0, weight_n).is_reached(0.0) is is_reached
