@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from gateway.audit.audit_file import AuditFile, audit_files, read_head
 from gateway.audit.audit_reader import read_audit, verify_audit
-from gateway.audit.chain import ChainEnd, open_line, seal_line
+from gateway.audit.chain import BrokenLine, ChainEnd, check_link, open_line, seal_line
 from gateway.cli.main import command
 from tests.audit.appending import append
 
@@ -282,3 +282,9 @@ def test_a_head_of_nothing_but_brackets_keeps_no_audit_from_being_stored(tmp_pat
     (tmp_path / "audit").mkdir()
     (tmp_path / "audit" / "head").write_text("[" * 50_000)
     assert read_head(tmp_path / "audit") is None
+
+
+@pytest.mark.parametrize(("number", "told"), [(9, "line 6 is missing"), (5, "wrong place"), (2, "wrong place")])
+def test_a_line_that_does_not_follow_says_what_is_missing(number: int, told: str) -> None:
+    with pytest.raises(BrokenLine, match=f"has number {number} after 5: .*{told}"):
+        check_link({"n": number, "prev": "x"}, ChainEnd(5, "x"))

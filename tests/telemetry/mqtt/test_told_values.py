@@ -46,6 +46,7 @@ def test_a_state_that_only_grows_older_is_not_told_again() -> None:
         ({"force_setpoint": 5, "force_setpoint@command": 30}, "force_setpoint@command stands twice"),
         ({}, "a command is JSON such as"),
         ('{"control_word": 1, "control_word": 3}', "control_word stands twice"),
+        ('{"force_setpoint": 0, "force_setpoint": 30}', "force_setpoint stands twice"),
     ],
 )
 def test_a_command_that_means_two_things_or_none_asks_nobody(command: Any, why: str) -> None:
