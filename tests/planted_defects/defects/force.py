@@ -174,4 +174,11 @@ DEFECTS = (
     Defect("a sign is not judged where friction may hold a stair whole", "control/runs/ladder_run.py",
            "if least_n == 0.0 and abs(rise_n) < LOWEST_SHARE * expected_n:", "if least_n == 0.0:",
            ("control/runs/test_ladder_by_hand.py",)),
+    Defect("a ladder on a machine that has become stronger goes by its old top", "control/supervision/force_ceiling.py",
+           "expected_n = max(expected_n, self._extrapolate(voltage_v, self._top, self._below_top))",
+           "expected_n = self._extrapolate(voltage_v, self._top, self._below_top)",
+           ("control/supervision/test_force_ceiling.py",)),
+    Defect("a steady pressure excuses a force that leaks", "control/self_test/judgement.py",
+           "verdict = max(verdict, above(pressure_per_s, warns, fails))", "verdict = above(pressure_per_s, warns, fails)",
+           ("control/self_test/test_judged_readings.py",)),
 )  # fmt: skip
